@@ -151,13 +151,13 @@ void add_voxel_grid(const std::string& name, const std::function<const points&()
 // -- the choice of a filter -----------------------------------------------------------------------------
 
 void add_select(std::size_t n) {
-  const auto add = [&](const std::string& row, const std::function<std::string(const points&)>& choose) {
-    add_cloud_row<std::string>(
+  const auto add = [&](const std::string& row, const std::function<cloud::filter_evidence(const points&)>& choose) {
+    add_cloud_row<cloud::filter_evidence>(
         "select_filter/n:" + std::to_string(n) + "/" + row, [n]() -> const points& { return room_cloud(n); }, choose,
-        [](const points& in, const std::string& reason) { return reason == cloud::select_filter(seq, in).reason; });
+        [](const points& in, const auto& evidence) { return evidence == cloud::select_filter(seq, in).evidence; });
   };
-  add("orbis", [](const points& in) { return cloud::select_filter(seq, in).reason; });
-  add("orbis_par2", [](const points& in) { return cloud::select_filter(par.with(2), in).reason; });
+  add("orbis", [](const points& in) { return cloud::select_filter(seq, in).evidence; });
+  add("orbis_par2", [](const points& in) { return cloud::select_filter(par.with(2), in).evidence; });
 }
 
 [[maybe_unused]] const bool registered = [] {

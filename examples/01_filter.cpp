@@ -37,8 +37,8 @@ int main(int argc, char** argv) {
 
   // The automatic filter analyses the cloud, and selects a filter and its parameters.
   const auto automatic = orbis::cloud::filter_automatically(orbis::par, cloud.points);
-  std::printf("automatic filter: %zu points kept; %s: %s\n", automatic.inliers.size(),
-              to_string(automatic.choice.chain).c_str(), automatic.choice.reason.c_str());
+  std::printf("automatic filter: %zu points kept by %s; median spacing %.1f mm\n", automatic.inliers.size(),
+              to_string(automatic.choice.chain).c_str(), 1e3 * automatic.choice.evidence.median_spacing);
 
   if (argc < 3) return 0;
   const auto written = orbis::io::write_ply(argv[2], cloud, automatic.inliers);

@@ -13,6 +13,7 @@
 
 #include <orbis/cloud/select-inl.hpp>
 
+#include "../../examples/common/filter_text.hpp"
 #include "heat_map.hpp"
 #include "scores.hpp"
 #include "settings.hpp"
@@ -105,7 +106,7 @@ int main(int argc, char** argv) {
         std::printf("%-34s %6zu points, %5.1f %% bad | F1 %.3f wrong %.4f | best %.3f %s | %s\n", c.name().c_str(),
                     c.points.size(), 100 * outlier_share(c), last.row[0].f1, last.row[0].wrong, last.row[best].f1,
                     table.settings[best].c_str(),
-                    (to_string(automatic.choice.chain) + ": " + automatic.choice.reason).c_str());
+                    (to_string(automatic.choice.chain) + ": " + examples::filter_text(automatic.choice)).c_str());
         std::fflush(stdout);
       }
     }

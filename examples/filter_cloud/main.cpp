@@ -12,6 +12,7 @@
 #include <orbis/cloud.hpp>
 #include <orbis/io.hpp>
 
+#include "../common/filter_text.hpp"
 #include "../common/near_origin.hpp"
 #include "../common/program.hpp"
 #include "../common/same_file.hpp"
@@ -80,7 +81,7 @@ int run(int argc, char** argv) {
                     : filter == "range-statistical" ? range_statistical_inliers(par, p, {eye}, {k.value_or(50), sigma})
                     : filter == "cluster"           ? cluster_inliers(par, p, {k.value_or(12)})
                                           : (best = filter_automatically(par, p, {k.value_or(8), eye})).inliers;
-  const auto why = filter == "auto" ? to_string(best.choice.chain) + ": " + best.choice.reason : filter;
+  const auto why = filter == "auto" ? to_string(best.choice.chain) + ": " + examples::filter_text(best.choice) : filter;
   if (auto ok = orbis::io::write_cloud(output, read, kept, origin); !ok)
     return report_error(2, examples::describe(ok.error()));
   if (kept.empty()) report_error(0, "warning: " + input + ": the filter removed all points");

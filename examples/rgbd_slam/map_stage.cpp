@@ -8,6 +8,7 @@
 #include <orbis/io/ply.hpp>
 #include <orbis/octree/files.hpp>
 
+#include "../common/filter_text.hpp"
 #include "filters.hpp"
 #include "summary.hpp"
 #include "view_frame.hpp"
@@ -30,14 +31,6 @@ void give_back_memory() {
 std::string describe(const built_map& map) {
   return count_text(map.cloud.size()) + " points, " + count_text(map.filter.removed) + " removed by filter " +
          std::string{to_string(map.filter.mode)} + ", octree of " + count_text(map.octree.num_leaves()) + " leaves";
-}
-
-/// The beginning of the sentence that explains why points were removed; empty if there were no moving objects.
-std::string describe(const orbis::mapping::moving_count& moving) {
-  if (moving.pixels == 0) return {};
-  return std::to_string(moving.pixels) + " pixels of " + std::to_string(moving.keyframes) +
-         (moving.keyframes == 1 ? " keyframe show" : " keyframes show") +
-         " moved objects (rays of other keyframes pass through them) and were removed; ";
 }
 
 /// An octree in which the voxels of the points are occupied.
@@ -161,7 +154,8 @@ result<map_results> write_map(built_map map, const settings& s, const std::files
   if (!done) return orbis::fail(done.error());
 
   m.filter_mode = to_string(map.filter.mode);
-  m.filter_reason = describe(map.moving) + map.filter.reason;
+  m.filter_reason =
+      examples::moved_objects_text(map.moving.pixels, map.moving.keyframes) + examples::filter_text(map.filter);
   m.moving_pixels = map.moving.pixels;
   m.moving_keyframes = map.moving.keyframes;
   m.resolution = s.resolution;

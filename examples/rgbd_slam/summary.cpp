@@ -180,12 +180,6 @@ std::string bytes_text(std::uintmax_t bytes) {
   return text("%.2f MB", b / 1e6);
 }
 
-std::string count_text(std::uintmax_t n) {
-  std::string digits = std::to_string(n);
-  for (std::size_t i = digits.size(); i > 3; i -= 3) digits.insert(i - 3, 1, ',');
-  return digits;
-}
-
 std::string size_table(const map_results& m) {
   const std::string octree = text("octree, %g cm", m.resolution * 100);
   const auto row = [](const std::string& name, const std::string& count, const char* unit, const std::string& bytes) {

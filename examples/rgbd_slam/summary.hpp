@@ -8,6 +8,7 @@
 
 #include <orbis/core/result.hpp>
 
+#include "../common/count_text.hpp"
 #include "results.hpp"
 
 namespace app {
@@ -36,7 +37,6 @@ namespace app {
 
 /// Formats a size: "12.3 MB".
 [[nodiscard]] std::string bytes_text(std::uintmax_t bytes);
-/// Formats a number with separators: "1,234,567".
-[[nodiscard]] std::string count_text(std::uintmax_t n);
+using examples::count_text;
 
 }  // namespace app

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <string>
@@ -18,8 +19,10 @@
 #include "cloud/views.hpp"
 #include "support/catch.hpp"
 
+using orbis::cloud::choice_status;
 using orbis::cloud::filter_automatically;
 using orbis::cloud::filter_mode;
+using orbis::cloud::threshold_source;
 
 namespace {
 
@@ -52,6 +55,22 @@ bool has_step(const orbis::cloud::filter_chain& chain, filter_mode mode) {
   return std::any_of(chain.begin(), chain.end(), [&](const auto& step) { return step_mode(step) == mode; });
 }
 
+/// Checks that each step of the chain has a share of removed points in the evidence, and each share a step.
+void check_shares(const orbis::cloud::filter_choice& choice) {
+  const auto& e = choice.evidence;
+  CHECK(has_step(choice.chain, filter_mode::ray_evidence) == (e.passed_through + e.unsupported > 0));
+  CHECK(has_step(choice.chain, filter_mode::isolation) == (e.isolated > 0));
+  CHECK(has_step(choice.chain, filter_mode::cluster) == (e.clustered > 0));
+  std::vector<filter_mode> in_chain, in_evidence;
+  for (const auto& step : choice.chain)
+    if (std::holds_alternative<orbis::cloud::density_step>(step)) in_chain.push_back(step_mode(step));
+  for (const auto& d : e.density) {
+    CHECK((d.source == threshold_source::none) == std::isinf(d.threshold));
+    if (d.removed > 0) in_evidence.push_back(d.mode);
+  }
+  CHECK(in_chain == in_evidence);
+}
+
 std::vector<double> thresholds(const orbis::cloud::filter_choice& choice) {
   std::vector<double> out;
   for (const auto& step : choice.chain) {
@@ -69,7 +88,7 @@ TEST_CASE("a clean cloud is left nearly whole") {
       INFO("noise " << noise << " seed " << seed);
       CHECK(score_of(filter_automatically(orbis::par, cloud).inliers, cloud.size(), 0).lost < 0.005);
       const auto ranged = filter_automatically(orbis::par, cloud, {.sensor_origin = orbis::vec3{0, 0, 0}});
-      INFO(ranged.choice.reason);
+      INFO(to_string(ranged.choice.chain));
       CHECK(score_of(ranged.inliers, cloud.size(), 0).lost < 0.005);
     }
   }
@@ -81,7 +100,7 @@ TEST_CASE("uniform outliers are found") {
     const auto outliers = static_cast<std::size_t>(percent / 100 * static_cast<double>(cloud.size()));
     add_uniform(cloud, outliers, 6);
     const auto result = filter_automatically(orbis::par, cloud, {.sensor_origin = orbis::vec3{0, 0, 0}});
-    INFO(percent << " %: " << result.choice.reason);
+    INFO(percent << " %: " << to_string(result.choice.chain));
     CHECK_FALSE(result.choice.chain.empty());
     const score s = score_of(result.inliers, cloud.size(), outliers);
     CHECK(s.found > 0.85);
@@ -89,19 +108,20 @@ TEST_CASE("uniform outliers are found") {
   }
 }
 
-TEST_CASE("the choice is the same under every policy and comes with its reason") {
+TEST_CASE("the choice is the same under every policy and comes with its evidence") {
   auto cloud = orbis::test::room_cloud(80, 60, 0.002, 7);
   add_uniform(cloud, 200, 8);
   const auto alone = filter_automatically(orbis::seq, cloud);
-  CHECK_FALSE(alone.choice.reason.empty());
+  CHECK(alone.choice.status == choice_status::complete);
+  CHECK(alone.choice.evidence.judged == cloud.size());
   for (const unsigned threads : {2U, 5U}) {
     const auto together = filter_automatically(orbis::par.with(threads), cloud);
     CHECK(together.inliers == alone.inliers);
     CHECK(to_string(together.choice.chain) == to_string(alone.choice.chain));
-    CHECK(together.choice.reason == alone.choice.reason);
+    CHECK(together.choice.evidence == alone.choice.evidence);
     const auto choice = orbis::cloud::select_filter(orbis::par.with(threads), cloud);
     CHECK(thresholds(choice) == thresholds(alone.choice));
-    CHECK(choice.reason == alone.choice.reason);
+    CHECK(choice.evidence == alone.choice.evidence);
   }
 }
 
@@ -116,6 +136,7 @@ TEST_CASE("a reference over range wins where spacing depends on range") {
   REQUIRE(choice.evidence.range_scale.has_value());
   CHECK(*choice.evidence.range_scale < choice.evidence.global_scale);
   CHECK(choice.evidence.density.front().mode == filter_mode::range_log_statistical);
+  CHECK(choice.evidence.range_exponent > 0.5);
 
   std::vector<float> ranges;
   for (const auto& p : cloud) ranges.push_back(p.norm());
@@ -133,21 +154,24 @@ TEST_CASE("holes in a cloud change neither the choice nor the shares it is expla
   holed.resize(5 * cloud.size(), orbis::vec3f::Constant(std::numeric_limits<float>::quiet_NaN()));
   const auto result = filter_automatically(orbis::seq, holed);
   CHECK(result.inliers == whole.inliers);
-  CHECK(result.choice.reason == whole.choice.reason);
-  CHECK(result.choice.evidence.density.front().removed == whole.choice.evidence.density.front().removed);
   CHECK(result.choice.evidence.points == holed.size());
   CHECK(result.choice.evidence.finite == cloud.size());
+  auto expected = whole.choice.evidence;
+  expected.points = holed.size();
+  CHECK(result.choice.evidence == expected);
 }
 
 TEST_CASE("automatic selection takes any cloud and never removes most of it") {
   for (const auto& [name, cloud] : orbis::test::all_clouds()) {
     const auto result = filter_automatically(orbis::seq, cloud);
-    INFO(name << ": " << result.choice.reason);
+    INFO(name << ": " << to_string(result.choice.chain));
     const auto finite = static_cast<std::size_t>(
         std::count_if(cloud.begin(), cloud.end(), [](const auto& p) { return orbis::is_finite(p); }));
     CHECK(result.inliers.size() <= finite);
     CHECK(2 * result.inliers.size() >= finite);
     CHECK(std::is_sorted(result.inliers.begin(), result.inliers.end()));
+    check_shares(result.choice);
+    CHECK((result.choice.status == choice_status::too_few_points) == (result.choice.evidence.judged < 50));
     if (cloud.size() < 50) CHECK(result.choice.chain.empty());
   }
 }
@@ -181,14 +205,15 @@ TEST_CASE("each kind of cloud gets the steps that suit it") {
     const auto result = filter_automatically(orbis::seq, grid);
     CHECK(result.choice.chain.empty());
     CHECK(result.inliers.size() == grid.size());
-    CHECK(result.choice.reason.find("no outliers found") != std::string::npos);
+    CHECK(result.choice.status == choice_status::complete);
   }
   SECTION("a test of density for uniform outliers") {
     auto cloud = clean;
     add_uniform(cloud, 1500, 9);
     const auto choice = orbis::cloud::select_filter(orbis::seq, cloud);
     CHECK(has_step(choice.chain, filter_mode::log_statistical));
-    CHECK(choice.reason.find("a separate population") != std::string::npos);
+    CHECK(choice.evidence.density.front().source == threshold_source::valley);
+    CHECK(choice.evidence.density.front().valley_position == choice.evidence.density.front().threshold);
   }
   SECTION("clusters for what hangs in the air") {
     auto cloud = clean;
@@ -203,7 +228,7 @@ TEST_CASE("each kind of cloud gets the steps that suit it") {
       }
     }
     const auto result = filter_automatically(orbis::seq, cloud);
-    INFO(result.choice.reason);
+    INFO(to_string(result.choice.chain));
     CHECK(has_step(result.choice.chain, filter_mode::cluster));
     const score s = score_of(result.inliers, cloud.size(), cloud.size() - good);
     CHECK(s.found > 0.95);
@@ -216,7 +241,7 @@ TEST_CASE("each kind of cloud gets the steps that suit it") {
       if (p.head<2>().norm() < 0.5F || random.below(10) == 0) cloud.push_back(p);
     }
     const auto result = filter_automatically(orbis::seq, cloud, {.sensor_origin = orbis::vec3{0, 0, 0}});
-    INFO(result.choice.reason);
+    INFO(to_string(result.choice.chain));
     CHECK(score_of(result.inliers, cloud.size(), 0).lost < 0.005);
   }
 }
@@ -237,7 +262,7 @@ TEST_CASE("outliers are found whatever the sensor, and the bounds can fail") {
           if (known) options.sensor_origin = orbis::vec3{0, 0, 0};
           const auto result = filter_automatically(orbis::par, cloud, options);
           const score s = score_of(result.inliers, cloud.size(), outliers);
-          INFO(noise << ' ' << percent << ' ' << voxels << known << ' ' << result.choice.reason);
+          INFO(noise << ' ' << percent << ' ' << voxels << known << ' ' << to_string(result.choice.chain));
           CHECK(s.found > 0.8);
           CHECK(s.lost < 0.02);
           found += s.found;
@@ -269,7 +294,7 @@ TEST_CASE("views show what no density can") {
   const auto seen = orbis::test::walked_past_wall();
   const auto alone = filter_automatically(orbis::par, seen.points, {.ranges = seen.ranges});
   const auto result = filter_automatically(orbis::par, seen.points, seen.views(), seen.camera, {.ranges = seen.ranges});
-  INFO(result.choice.reason);
+  INFO(to_string(result.choice.chain));
   REQUIRE(has_step(result.choice.chain, filter_mode::ray_evidence));
   const auto f1 = [&](const std::vector<std::uint32_t>& inliers) { return seen.f1_of_removal(inliers); };
   CHECK(f1(alone.inliers) < 0.3);
@@ -278,11 +303,12 @@ TEST_CASE("views show what no density can") {
   CHECK(step.distrusted == std::vector<std::uint32_t>{5});
   CHECK(step.need_support);
   CHECK(result.choice.evidence.views == 8);
+  check_shares(result.choice);
 
   const auto again = filter_automatically(orbis::seq, seen.points, seen.views(), orbis::camera::any_camera{seen.camera},
                                           {.ranges = seen.ranges});
   CHECK(again.inliers == result.inliers);
-  CHECK(again.choice.reason == result.choice.reason);
+  CHECK(again.choice.evidence == result.choice.evidence);
 
   SECTION("whoever drew the samples of the views") {
     orbis::cloud::view_samples samples;
@@ -290,7 +316,7 @@ TEST_CASE("views show what no density can") {
     const auto drawn = filter_automatically(orbis::par.with(3), seen.points, seen.views(), seen.camera,
                                             {.ranges = seen.ranges, .samples = &samples});
     CHECK(drawn.inliers == result.inliers);
-    CHECK(drawn.choice.reason == result.choice.reason);
+    CHECK(drawn.choice.evidence == result.choice.evidence);
   }
   SECTION("if there are too few to outvote one, all count") {
     auto few = seen.views();
@@ -316,7 +342,7 @@ TEST_CASE("views show what no density can") {
                                               [&](std::size_t, std::size_t) { return ++calls < 5; });
     CHECK(calls == 5);
     CHECK(stopped.choice.chain.empty());
-    CHECK(stopped.choice.reason == "cancelled");
+    CHECK(stopped.choice.status == choice_status::cancelled);
     CHECK(stopped.inliers.size() == seen.points.size());
   }
 }

@@ -52,7 +52,20 @@ TEST_CASE("every filter that is asked for by name removes the point before the w
     CHECK(filtered.report.removed == 1);
     CHECK(filtered.report.points == s.points.size());
     CHECK(to_string(filtered.report.mode) == name);
-    CHECK(filtered.report.reason.starts_with("requested; "));
+    CHECK(filtered.report.kind == kind);
+    const bool by_distance = kind == filter_kind::statistical || kind == filter_kind::log_statistical;
+    CHECK(filtered.report.max_mean_distance.has_value() == by_distance);
+    if (by_distance) {
+      CHECK(*filtered.report.max_mean_distance > 0.02);  // the spacing of the wall
+      CHECK(*filtered.report.max_mean_distance < 0.8);   // the distance of the point from it
+    }
+    REQUIRE(filtered.report.clusters.has_value() == (kind == filter_kind::cluster));
+    if (filtered.report.clusters) {
+      CHECK(filtered.report.clusters->components == 2);
+      CHECK(filtered.report.clusters->removed == 1);
+      CHECK(filtered.report.clusters->min_size == 30);
+    }
+    CHECK_FALSE(filtered.report.choice.has_value());
     CHECK(mapping::filter_points(seq, s.points, {}, s.views, s.camera, options).inliers == filtered.inliers);
   }
 }
@@ -64,6 +77,17 @@ TEST_CASE("rays cannot judge where there are no views, and none removes nothing"
     CHECK(filtered.inliers.size() == s.points.size());
     CHECK(filtered.report.removed == 0);
     CHECK(filtered.report.mode.empty());
-    CHECK(filtered.report.reason.find("requested") != std::string::npos);
+    CHECK(filtered.report.kind == kind);
   }
+}
+
+TEST_CASE("the report of the automatic filter has the choice with its evidence") {
+  const scene s;
+  const auto filtered = mapping::filter_points(par, s.points, {}, s.views, s.camera);
+  CHECK(filtered.report.kind == filter_kind::automatic);
+  CHECK(filtered.report.removed == 1);
+  REQUIRE(filtered.report.choice.has_value());
+  CHECK(to_string(filtered.report.choice->chain) == to_string(filtered.report.mode));
+  CHECK(filtered.report.choice->status == cloud::choice_status::complete);
+  CHECK(filtered.report.choice->evidence.views == s.views.size());
 }

@@ -9,7 +9,6 @@
 
 #include <orbis/cloud/detail/select/decision.hpp>
 #include <orbis/cloud/detail/select/density_judge.hpp>
-#include <orbis/cloud/detail/select/describe.hpp>
 #include <orbis/cloud/detail/select/surroundings.hpp>
 #include <orbis/cloud/detail/select/view_judge.hpp>
 #include <orbis/cloud/ray_evidence-inl.hpp>
@@ -39,18 +38,6 @@ inline void clear_removed(const surroundings& around, std::span<char> left) {
   }
 }
 
-[[nodiscard]] inline std::string join_reasons(const filter_choice& choice, std::span<const std::string> reasons,
-                                              bool by_range) {
-  std::string out;
-  for (const std::string& r : reasons) {
-    if (!out.empty()) out += "; ";
-    out += r;
-  }
-  if (out.empty()) out = "no outliers found";
-  return joined({out, " (median spacing ", describe(1e3 * choice.evidence.median_spacing), " mm",
-                 by_range ? ", which grows with range)" : ")"});
-}
-
 template <execution_policy Policy>
 automatic_result choose_and_filter(const Policy& policy, const point_view& points, std::span<const float> ranges,
                                    const select_options& options, const view_judge& views) {
@@ -60,10 +47,9 @@ automatic_result choose_and_filter(const Policy& policy, const point_view& point
   choice.evidence.points = points.size();
   std::vector<char> left = finite_points(points);
   choice.evidence.finite = static_cast<std::size_t>(std::ranges::count(left, char{1}));
-  std::vector<std::string> reasons;
-  if (views.run != nullptr && !views.run(views.context, left, choice, reasons)) {
+  if (views.run != nullptr && !views.run(views.context, left, choice)) {
     choice.chain.clear();
-    choice.reason = "cancelled";
+    choice.status = choice_status::cancelled;
     out.inliers = kept_points(points, left, options);
     return out;
   }
@@ -75,15 +61,10 @@ automatic_result choose_and_filter(const Policy& policy, const point_view& point
     choice.evidence.judged += judged ? 1 : 0;
   }
   if (choice.evidence.judged < enough) {
-    if (reasons.empty())
-      reasons.push_back(joined({"too few points (", std::to_string(choice.evidence.judged), ") to evaluate"}));
-    choice.reason = reasons.front();
+    choice.status = choice_status::too_few_points;
   } else {
-    judge_points(policy, around, options, choice, reasons);
+    judge_points(policy, around, options, choice);
     clear_removed(around, left);
-    const bool by_range = std::ranges::any_of(
-        choice.evidence.density, [](const auto& d) { return d.mode == filter_mode::range_log_statistical; });
-    choice.reason = join_reasons(choice, reasons, by_range);
   }
   out.inliers = kept_points(points, left, options);
   return out;
@@ -92,9 +73,8 @@ automatic_result choose_and_filter(const Policy& policy, const point_view& point
 /// Wraps a function object as a `view_judge`.
 template <class F>
 [[nodiscard]] view_judge make_view_judge(const F& judge) {
-  return {&judge,
-          [](const void* context, std::span<char> left, filter_choice& choice, std::vector<std::string>& reasons) {
-            return (*static_cast<const F*>(context))(left, choice, reasons);
+  return {&judge, [](const void* context, std::span<char> left, filter_choice& choice) {
+            return (*static_cast<const F*>(context))(left, choice);
           }};
 }
 
@@ -108,8 +88,8 @@ automatic_result filter_automatically(const Policy& policy, const Points& points
   const detail::viewed_points all{points};
   const detail::known_ranges ranges{threads, points, options};
   return detail::with_model(camera, [&](const auto& model) {
-    const auto judge = [&](std::span<char> left, filter_choice& choice, std::vector<std::string>& reasons) {
-      return detail::judge_views(threads, all, views, model, options, left, choice, reasons, on_progress);
+    const auto judge = [&](std::span<char> left, filter_choice& choice) {
+      return detail::judge_views(threads, all, views, model, options, left, choice, on_progress);
     };
     return detail::choose_and_filter(threads, all, ranges.all, options, detail::make_view_judge(judge));
   });

@@ -20,7 +20,6 @@
 #include <cstdint>
 #include <ranges>
 #include <span>
-#include <string>
 #include <vector>
 
 #include <orbis/camera/model.hpp>
@@ -45,10 +44,9 @@ namespace detail {
 /// Type-erased callback that evaluates points against views. Returns false if cancelled.
 struct view_judge {
   const void* context = nullptr;
-  /// Sets `left` to 0 for the points that the views exclude, and adds a step and its reason; null if there are no
+  /// Sets `left` to 0 for the points that the views exclude, and adds a step and its evidence; null if there are no
   /// views.
-  bool (*run)(const void* context, std::span<char> left, filter_choice& choice,
-              std::vector<std::string>& reasons) = nullptr;
+  bool (*run)(const void* context, std::span<char> left, filter_choice& choice) = nullptr;
 };
 
 /// `filter_automatically` on a type-erased cloud and views. `ranges`: one per point, or empty if none is known.
@@ -79,7 +77,7 @@ struct known_ranges {
 /// as points on moving objects or from wrong poses, which the density does not reveal.
 ///
 /// Deterministic and the same for every policy. `on_progress` counts the views; if it cancels, the chain is empty, the
-/// reason is "cancelled", and all points are kept. O(n log n + views (pixels + n)).
+/// status is `cancelled`, and all points are kept. O(n log n + views (pixels + n)).
 /// @pre neighbors > 0; ranges is empty or as long as points; views' images have the camera's size; samples, if given,
 /// are from these views
 template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>

@@ -1,18 +1,16 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The outlier filter of a map, selected at run time, with a report.
+/// The outlier filter of a map, selected at run time, with a report: numbers and enumerators, no text.
 #pragma once
 
 #include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <cstdio>
 #include <numeric>
 #include <optional>
 #include <ranges>
 #include <span>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -49,14 +47,26 @@ struct filter_options {
   cloud::ray_evidence_options ray_evidence{};
 };
 
-/// Report of a filter run: steps, thresholds and reason.
+/// Components of the neighbour graph that the cluster filter found.
+struct cluster_count {
+  std::size_t components = 0;
+  std::size_t removed = 0;   ///< components that are small and far from the large ones
+  std::size_t min_size = 0;  ///< components with fewer points count as small
+};
+
+/// Report of a filter run: the steps, and the measurements on which they are based.
 struct filter_report {
-  cloud::filter_chain mode{};  ///< the steps; `to_string` returns their names, such as "log-statistical+cluster"
-  std::string reason{};
+  filter_kind kind = filter_kind::none;  ///< the kind that was requested
+  /// The steps; `to_string` returns their names, such as "log-statistical+cluster". Empty if all points are kept: the
+  /// automatic filter found no outliers, `kind` is `none`, or `ray_evidence` without depth images was requested.
+  cloud::filter_chain mode{};
   std::size_t points = 0;  ///< number of points before filtering
   std::size_t removed = 0;
   double seconds = 0;
-  std::optional<cloud::filter_choice> choice{};  ///< set if the filter was selected automatically
+  /// Maximum mean distance of an inlier to its neighbours, metres; set by `statistical` and `log_statistical`.
+  std::optional<double> max_mean_distance{};
+  std::optional<cluster_count> clusters{};       ///< set by `cluster`
+  std::optional<cloud::filter_choice> choice{};  ///< set by `automatic`: the choice with its evidence
 };
 
 struct filtered_indices {
@@ -65,12 +75,6 @@ struct filtered_indices {
 };
 
 namespace detail {
-
-[[nodiscard]] inline std::string in_millimetres(double metres) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g mm", 1e3 * metres);
-  return text;
-}
 
 [[nodiscard]] inline std::vector<std::uint32_t> all_indices(std::size_t count) {
   std::vector<std::uint32_t> all(count);
@@ -87,6 +91,7 @@ template <execution_policy Policy, point_range Points, class Automatic, class By
   const auto start = std::chrono::steady_clock::now();
   filtered_indices out;
   filter_report& report = out.report;
+  report.kind = options.kind;
   report.points = std::ranges::size(points);
   switch (options.kind) {
     case filter_kind::automatic: {
@@ -95,27 +100,20 @@ template <execution_policy Policy, point_range Points, class Automatic, class By
       cloud::automatic_result result = automatically(select);
       out.inliers = std::move(result.inliers);
       report.mode = result.choice.chain;
-      report.reason = result.choice.reason;
       report.choice = std::move(result.choice);
       break;
     }
-    case filter_kind::none:
-      out.inliers = all_indices(report.points);
-      report.reason = "requested";
-      break;
+    case filter_kind::none: out.inliers = all_indices(report.points); break;
     case filter_kind::statistical: {
       cloud::statistical_result result = cloud::statistical_filter(policy, points, options.statistical);
       out.inliers = std::move(result.inliers);
       report.mode = {options.statistical};
-      report.reason = "requested; mean distance to " + std::to_string(options.statistical.neighbors) +
-                      " neighbours at most " + in_millimetres(result.threshold);
+      report.max_mean_distance = result.threshold;
       break;
     }
     case filter_kind::radius:
       out.inliers = cloud::radius_inliers(policy, points, options.radius);
       report.mode = {options.radius};
-      report.reason = "requested; at least " + std::to_string(options.radius.min_neighbors) + " neighbours within " +
-                      in_millimetres(options.radius.radius);
       break;
     case filter_kind::log_statistical: {
       cloud::log_statistical_result result = cloud::log_statistical_filter(policy, points, options.log_statistical);
@@ -124,24 +122,22 @@ template <execution_policy Policy, point_range Points, class Automatic, class By
                                          .neighbors = options.log_statistical.neighbors,
                                          .usual = {result.median, 0},
                                          .threshold = result.threshold}};
-      report.reason = "requested; mean distance to " + std::to_string(options.log_statistical.neighbors) +
-                      " neighbours at most " + in_millimetres(result.threshold_distance);
+      report.max_mean_distance = result.threshold_distance;
       break;
     }
     case filter_kind::cluster: {
       cloud::cluster_result result = cloud::cluster_filter(policy, points, options.cluster);
       out.inliers = std::move(result.inliers);
       report.mode = {options.cluster};
-      report.reason = "requested; " +
-                      std::to_string(std::count(result.removed.begin(), result.removed.end(), char{1})) + " of " +
-                      std::to_string(result.sizes.size()) + " components have fewer than " +
-                      std::to_string(result.min_size) + " points and are far from the others";
+      report.clusters = {
+          .components = result.sizes.size(),
+          .removed = static_cast<std::size_t>(std::count(result.removed.begin(), result.removed.end(), char{1})),
+          .min_size = result.min_size};
       break;
     }
     case filter_kind::ray_evidence:
       out.inliers = by_rays(options.ray_evidence);
       report.mode = {cloud::ray_step{.evidence = options.ray_evidence}};
-      report.reason = "requested; removes points that rays of other keyframes pass through";
       break;
   }
   report.removed = report.points - out.inliers.size();
@@ -159,10 +155,7 @@ template <execution_policy Policy, point_range Points>
       policy, points, ranges, options,
       [&](const cloud::select_options& select) { return cloud::filter_automatically(policy, points, select); },
       [&](const cloud::ray_evidence_options&) { return detail::all_indices(std::ranges::size(points)); });
-  if (options.kind == filter_kind::ray_evidence) {
-    out.report.mode.clear();
-    out.report.reason = "ray evidence was requested, but there are no depth images: every point is kept";
-  }
+  if (options.kind == filter_kind::ray_evidence) out.report.mode.clear();
   return out;
 }
 

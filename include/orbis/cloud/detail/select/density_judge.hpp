@@ -11,11 +11,9 @@
 #include <limits>
 #include <optional>
 #include <span>
-#include <string>
 #include <utility>
 #include <vector>
 
-#include <orbis/cloud/detail/select/describe.hpp>
 #include <orbis/cloud/detail/select/log_density.hpp>
 #include <orbis/cloud/detail/select/surroundings.hpp>
 #include <orbis/cloud/filter_chain.hpp>
@@ -103,36 +101,24 @@ template <execution_policy Policy>
     out.threshold = std::numeric_limits<double>::infinity();
     return out;
   }
+  out.source = two_populations ? threshold_source::valley : threshold_source::bulk;
   out.threshold = two_populations ? v.position : std::max({manner.without_valley, 6 * scale, out.surface_end});
   const double shoulder_start = std::max({0.75, 5 * scale, out.surface_end});
   if (manner.shoulders && shoulder_start < out.threshold) {
     const auto n = std::ranges::count_if(loose, [&](double x) { return x > shoulder_start && x <= out.threshold; });
     out.shoulder = static_cast<double>(n) / static_cast<double>(residual.size());
-    if (out.shoulder > (v.ratio > 3 ? 0.025 : 0.01)) out.threshold = shoulder_start;
+    if (out.shoulder > (v.ratio > 3 ? 0.025 : 0.01)) {
+      out.source = threshold_source::shoulder;
+      out.threshold = shoulder_start;
+    }
   }
   return out;
 }
 
-[[nodiscard]] inline std::string describe(const density_evidence& e) {
-  std::string out = joined({percent(e.removed), " of the points are more than ", describe(std::exp(e.threshold)),
-                            " times sparser than usual"});
-  if (e.mode == filter_mode::range_log_statistical) out += " for their range";
-  if (e.mode == filter_mode::local_log_statistical) out += " for their surroundings";
-  out += " and not on a surface";
-  if (e.threshold == e.valley_position) {
-    out += joined({" (a separate population: its peak is ", describe(e.valley_ratio),
-                   " times higher than the valley before it)"});
-  } else if (e.shoulder > 0.01) {
-    out += joined({" (", percent(e.shoulder), " form a shoulder of the distribution, as flying pixels do)"});
-  }
-  return out;
-}
-
-/// Evaluates the remaining points of a cloud without views; adds the resulting steps and their reasons. The tests store
-/// their removals in `around`.
+/// Evaluates the remaining points of a cloud without views; adds the resulting steps and their evidence. The tests
+/// store their removals in `around`.
 template <execution_policy Policy>
-void judge_points(const Policy& policy, surroundings& around, const select_options& options, filter_choice& choice,
-                  std::vector<std::string>& reasons) {
+void judge_points(const Policy& policy, surroundings& around, const select_options& options, filter_choice& choice) {
   filter_evidence& evidence = choice.evidence;
   // Choose the reference with the narrower bulk, with a bonus for the simpler one.
   reference global;
@@ -154,7 +140,9 @@ void judge_points(const Policy& policy, surroundings& around, const select_optio
       evidence.range_scale = bulk_width(ranged->width);
     }
   }
-  const bool by_range = ranged && ranged->step.usual.slope > 0 && *evidence.range_scale < 0.85 * evidence.global_scale;
+  evidence.range_exponent = ranged ? ranged->step.usual.slope : 0;
+  const bool grows = evidence.range_exponent > 0;
+  const bool by_range = grows && *evidence.range_scale < 0.85 * evidence.global_scale;
   const reference& usual = by_range ? *ranged : global;
   evidence.left_scale = usual.width.left_scale;
   evidence.right_scale = usual.width.right_scale;
@@ -187,7 +175,6 @@ void judge_points(const Policy& policy, surroundings& around, const select_optio
       density_step step = r.step;
       step.threshold = found.threshold;
       found.removed = try_step(step);
-      if (found.removed > 0) reasons.push_back(describe(found));
     }
     evidence.density.push_back(found);
   };
@@ -195,7 +182,7 @@ void judge_points(const Policy& policy, surroundings& around, const select_optio
   // A reference over range can hide outliers that are spread over all ranges; a constant reference detects them.
   if (by_range) {
     test(global, {.shoulders = false, .least_ratio = 3, .needs_valley = true});
-  } else if (ranged && ranged->step.usual.slope > 0) {
+  } else if (grows) {
     test(*ranged, {.shoulders = false, .least_ratio = 3, .needs_valley = true});
   }
   test(local, {.lowest = 1.0, .shoulders = false});
@@ -205,18 +192,10 @@ void judge_points(const Policy& policy, surroundings& around, const select_optio
   isolation.usual = usual.step.usual;
   isolation.offset = local.step.offset;
   evidence.isolated = try_step(isolation);
-  if (evidence.isolated > 0)
-    reasons.push_back(
-        joined({percent(evidence.isolated), " are groups of fewer than ", std::to_string(isolation.min_size),
-                " points more than ", describe(isolation.reach), " usual spacings from all others"}));
   cluster_options cluster;
   cluster.min_size = std::clamp<std::size_t>(around.size() / 125, 30, 300);
   cluster.min_gap = 4;
   evidence.clustered = try_step(cluster);
-  if (evidence.clustered > 0)
-    reasons.push_back(
-        joined({percent(evidence.clustered), " are clusters of fewer than ", std::to_string(cluster.min_size),
-                " points at least ", describe(cluster.min_gap), " spacings from the surface"}));
 }
 
 }  // namespace orbis::cloud::detail

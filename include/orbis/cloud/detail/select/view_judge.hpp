@@ -10,13 +10,11 @@
 #include <limits>
 #include <ranges>
 #include <span>
-#include <string>
 #include <vector>
 
 #include <orbis/camera/model.hpp>
 #include <orbis/cloud/detail/rays/depth_windows.hpp>
 #include <orbis/cloud/detail/rays/view_trust.hpp>
-#include <orbis/cloud/detail/select/describe.hpp>
 #include <orbis/cloud/filter_chain.hpp>
 #include <orbis/cloud/filter_choice.hpp>
 #include <orbis/cloud/ray_evidence-inl.hpp>
@@ -97,11 +95,11 @@ class source_view_test {
 };
 
 /// Evaluates a cloud against its views, sets `left` to 0 for the points that they exclude, and adds the step and its
-/// reason. Returns false if cancelled.
+/// evidence. Returns false if cancelled.
 template <execution_policy Policy, posed_depth_range Views, camera::camera_model Camera>
 [[nodiscard]] bool judge_views(const Policy& policy, const point_view& points, const Views& views, const Camera& camera,
                                const select_options& options, std::span<char> left, filter_choice& choice,
-                               std::vector<std::string>& reasons, progress on_progress) {
+                               progress on_progress) {
   filter_evidence& evidence = choice.evidence;
   evidence.views = std::ranges::size(views);
   if (evidence.views == 0) return true;
@@ -144,20 +142,7 @@ template <execution_policy Policy, posed_depth_range Views, camera::camera_model
   const auto total = static_cast<double>(std::max<std::size_t>(evidence.finite, 1));
   evidence.passed_through = static_cast<double>(removed.passed_through) / total;
   evidence.unsupported = static_cast<double>(removed.unsupported) / total;
-  if (removed.passed_through + removed.unsupported == 0) return true;
-  std::string why;
-  const std::string all = std::to_string(count);
-  if (!step.distrusted.empty()) {
-    const bool one = step.distrusted.size() == 1;
-    why = joined({std::to_string(step.distrusted.size()), " of ", all, one ? " views contradicts" : " views contradict",
-                  " the others (by up to ", percent(trust.worst_conflict), ") and ", one ? "is" : "are", " ignored; "});
-  }
-  why += joined({"the rays of ", all, " views pass through ", percent(evidence.passed_through), " of the points"});
-  if (removed.unsupported > 0)
-    why += joined(
-        {", and ", percent(evidence.unsupported), " are measured by no trusted view (stray pixels do not count)"});
-  reasons.push_back(std::move(why));
-  choice.chain.emplace_back(std::move(step));
+  if (removed.passed_through + removed.unsupported > 0) choice.chain.emplace_back(std::move(step));
   return true;
 }
 
