@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <vector>
 
 #include <orbis/camera/pinhole.hpp>
+#include <orbis/cloud/extract.hpp>
 #include <orbis/mapping/dense_cloud.hpp>
 
 #include "mapping/keyframes.hpp"
@@ -120,17 +122,16 @@ TEST_CASE("a keyframe's measurements are those whose point of the cloud is kept"
     dense_cloud dense{rays, {.stride = 2, .voxel_size = voxel}};
     std::size_t measured = 0;
     for (std::size_t i = 0; i != 3; ++i) measured += dense.add_keyframe(orbis::par.with(2), scene.keyframe(i));
-    const std::vector<char> all(dense.size(), 1);
-    const std::vector<char> none(dense.size(), 0);
-    std::vector<char> half(dense.size(), 0);
     const orbis::point_cloud cloud = dense.cloud();
-    for (std::size_t i = 0; i != half.size(); ++i) half[i] = cloud.points[i].x() < 0;
+    const auto all = orbis::cloud::pass_through_inliers(cloud.points);
+    const auto half = orbis::cloud::pass_through_inliers(cloud.points, {.high = {0.0, 9.0, 9.0}});
+    REQUIRE(all.size() == dense.size());
     std::size_t found = 0;
     for (std::size_t i = 0; i != 3; ++i) {
       const auto every = dense.measurements(orbis::seq, scene.keyframe(i), i);
       CHECK(dense.measurements(orbis::seq, scene.keyframe(i), i, dense.select(all)) == every);
       CHECK(dense.measurements(orbis::par.with(3), scene.keyframe(i), i, dense.select(all)) == every);
-      CHECK(dense.measurements(orbis::seq, scene.keyframe(i), i, dense.select(none)).empty());
+      CHECK(dense.measurements(orbis::seq, scene.keyframe(i), i, dense.select({})).empty());
       const auto left = dense.measurements(orbis::seq, scene.keyframe(i), i, dense.select(half));
       CHECK(left.size() > every.size() / 4);
       CHECK(left.size() < every.size());
@@ -344,15 +345,13 @@ TEST_CASE("a masked depth image holds the pixels whose point of the cloud is kep
       for (std::size_t i = 0; i != 3; ++i) dense.add_keyframe(orbis::seq, scene.keyframe(i));
       // Kept: what lies left of the middle.
       const auto points = dense.cloud().points;
-      std::vector<char> left;
-      for (const auto& p : points) left.push_back(p.x() < 0.0F ? 1 : 0);
-      const auto selection = dense.select(left);
+      const auto selection = dense.select(orbis::cloud::pass_through_inliers(points, {.high = {0.0, 9.0, 9.0}}));
       std::size_t kept = 0;
       for (std::size_t i = 0; i != 3; ++i) {
         const auto k = scene.keyframe(i);
         const auto all = dense.masked_depth(orbis::seq, k, i);
         const auto some = dense.masked_depth(orbis::par.with(3), k, i, selection);
-        const auto none = dense.masked_depth(orbis::seq, k, i, dense.select(std::vector<char>(points.size(), 0)));
+        const auto none = dense.masked_depth(orbis::seq, k, i, dense.select({}));
         std::size_t measured = 0, wrong = 0, left_over = 0;
         const orbis::camera::ray_table rays{scene.camera};
         const orbis::camera::float_pose pose{k.T_world_camera};
@@ -389,8 +388,9 @@ TEST_CASE("a cloud that is read for the last time frees its sums, and masks imag
   orbis::mapping::dense_cloud dense{orbis::camera::ray_table{scene.camera}, {.stride = 1, .voxel_size = 0.03}};
   for (std::size_t i = 0; i != 3; ++i) dense.add_keyframe(orbis::seq, scene.keyframe(i));
   const std::size_t size = dense.size();
-  std::vector<char> kept(size, 1);
-  for (std::size_t i = 0; i < size; i += 3) kept[i] = 0;
+  std::vector<std::uint32_t> kept;
+  for (std::uint32_t i = 0; i != size; ++i)
+    if (i % 3 != 0) kept.push_back(i);
   std::vector<decltype(dense.masked_depth(orbis::seq, scene.keyframe(0), 0))> before;
   for (std::size_t i = 0; i != 3; ++i)
     before.push_back(dense.masked_depth(orbis::seq, scene.keyframe(i), i, dense.select(kept)));
@@ -413,8 +413,8 @@ TEST_CASE("a stray pixel between the strides does not follow the point of its bl
     stored(x, y) = static_cast<std::uint16_t>(stored(x, y) / 3);
     orbis::mapping::dense_cloud dense{orbis::camera::ray_table{scene.camera}, {.stride = 2, .voxel_size = voxel}};
     dense.add_keyframe(orbis::seq, scene.keyframe(0));
-    std::vector<char> kept(dense.size(), 1);
-    kept[0] = 0;  // so that the selection is not everything
+    std::vector<std::uint32_t> kept(dense.size() - 1);
+    std::iota(kept.begin(), kept.end(), 1U);  // without the first, so that the selection is not everything
     const auto masked = dense.masked_depth(orbis::seq, scene.keyframe(0), 0, dense.select(kept));
     CHECK(masked(x, y) == 0);
     CHECK(masked(x - 1, y) != 0);

@@ -253,9 +253,7 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   done += looks * std::ranges::size(keyframes);
   map.filter = std::move(filtered.report);
   map.inliers = std::move(filtered.inliers);
-  std::vector<char> kept(map.cloud.size(), 0);
-  for (const std::uint32_t i : map.inliers) kept[i] = 1;
-  const dense_cloud::selection kept_points = dense.select(std::move(kept));
+  const dense_cloud::selection kept_points = dense.select(map.inliers);
 
   if (map.skipped != 0 && !on_progress(done += map.skipped, total)) return fail(errc::cancelled, {}, "cancelled");
   const auto watched = [&](std::size_t passed, std::size_t) { return on_progress(done + passed, total); };

@@ -191,9 +191,14 @@ class dense_cloud {
     std::optional<cloud::voxel_sums::choice> voxels_;  ///< used if points are merged
     std::vector<std::size_t> first_of_frame_;
   };
-  /// Creates a selection. `kept`: one entry for each point of the cloud, nonzero to keep the point.
-  [[nodiscard]] selection select(std::vector<char> kept) const {
-    assert(kept.size() == size());
+  /// Creates a selection of the points with the given indices, such as a filter of the cloud returns. O(size).
+  /// @pre every index < size()
+  [[nodiscard]] selection select(std::span<const std::uint32_t> inliers) const {
+    std::vector<char> kept(size(), 0);
+    for (const std::uint32_t i : inliers) {
+      assert(i < kept.size());
+      kept[i] = 1;
+    }
     selection out;
     if (merging()) {
       out.voxels_ = voxels_.choose(kept);
