@@ -11,7 +11,7 @@
 #include <vector>
 
 #ifdef ORBIS_TEST_WITH_CERES
-#include <ceres_bundle.hpp>
+#include <optimize/ceres_bundle.hpp>
 #endif
 
 #include <orbis/camera/pinhole.hpp>
