@@ -4,7 +4,6 @@
 #include <type_traits>
 
 #include <orbis/camera/depth.hpp>
-#include <orbis/camera/rgbd_frame.hpp>
 
 #include "support/catch.hpp"
 
@@ -48,15 +47,6 @@ TEST_CASE("the limits of the range belong to it and ranges can only be narrowed"
   CHECK(narrow(1, 0) == 0.0F);
   CHECK(narrow(2, 0) == 2.0F);
   CHECK(narrow(4, 0) == 0.0F);
-}
-
-TEST_CASE("a frame shows its depth in metres") {
-  camera::rgbd_frame frame;
-  frame.depth = image<std::uint16_t>{2, 2, 2500};
-  CHECK(frame.depth_metres()(1, 1) == 2.5F);
-  frame.depth_scale = 5000.0;
-  CHECK(frame.depth_metres()(1, 1) == 0.5F);
-  CHECK(!frame.T_world_camera);
 }
 
 TEST_CASE("a depth view knows its number type from the image it is made of") {

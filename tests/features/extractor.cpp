@@ -13,7 +13,6 @@
 #include <orbis/features/windowed-inl.hpp>
 
 #include "features/images.hpp"
-#include "features/sources.hpp"
 #include "support/catch.hpp"
 
 using namespace orbis;
@@ -54,11 +53,6 @@ struct grid_describer {
   }
 };
 
-/// As many bits as ORB's, of somebody else's type.
-struct foreign_bits {
-  std::uint64_t a, b, c, d;
-};
-
 struct no_extractor {
   int operator()(image_view<const rgb8>) const { return 0; }
 };
@@ -84,17 +78,6 @@ TEST_CASE("an extractor of one's own parts gives features that any matcher takes
     right += std::abs(g.keypoints[m.train].x - f.keypoints[m.query].x - 6.0F) < 2.0F &&
              std::abs(g.keypoints[m.train].y - f.keypoints[m.query].y - 3.0F) < 2.0F;
   CHECK(right * 10 > matches.size() * 9);
-}
-
-TEST_CASE("the Hamming kernels take bit strings of any type") {
-  const auto f = test::random_features(90, 1), g = test::random_features(150, 2);
-  const auto foreign = [](const std::vector<binary_descriptor<256>>& all) {
-    std::vector<foreign_bits> bits;
-    for (const auto& d : all) bits.push_back({d.words[0], d.words[1], d.words[2], d.words[3]});
-    return bits;
-  };
-  const auto matcher = brute_force(hamming{}) | cross_check{};
-  CHECK(matcher(foreign(f.descriptors), foreign(g.descriptors)) == matcher(f.descriptors, g.descriptors));
 }
 
 TEST_CASE("corners are ordered by place, and by strength with ties by place") {

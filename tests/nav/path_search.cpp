@@ -11,6 +11,7 @@
 #include <orbis/octree/occupancy_octree.hpp>
 
 #include "nav/dijkstra.hpp"
+#include "nav/maze.hpp"
 #include "support/catch.hpp"
 
 using namespace orbis;
@@ -18,50 +19,9 @@ using nav::path_method;
 using nav::path_status;
 using octree::occupancy;
 using octree::voxel_key;
+using test::cell, test::is_free, test::key, test::map_type, test::maze, test::random_point, test::set;
 
 namespace {
-
-using map_type = octree::occupancy_octree<>;
-
-constexpr double cell = 0.1;
-
-voxel_key key(int x, int y, int z) {
-  const auto along = [](int c) { return static_cast<std::uint32_t>(c + 32768); };
-  return {along(x), along(y), along(z)};
-}
-void set(map_type& map, int x, int y, int z, bool occupied) {
-  map.edit_octant(key(x, y, z), [&](octree::block<float>& b) {
-    const auto i = octree::morton_code(key(x, y, z)) & 63U;
-    b.known |= std::uint64_t{1} << i;
-    b.value[i] = occupied ? 1.0F : -1.0F;
-  });
-}
-/// Free space of `size` voxels from the origin on, with boxes of obstacles in it; of a share of it nothing is known.
-map_type maze(random_bits& random, std::array<int, 3> size, int boxes, double unknown = 0.0) {
-  map_type map{cell};
-  for (int z = 0; z != size[2]; ++z)
-    for (int y = 0; y != size[1]; ++y)
-      for (int x = 0; x != size[0]; ++x)
-        if (unknown == 0.0 || random.uniform() >= unknown) set(map, x, y, z, false);
-  const auto below = [&](int n) { return static_cast<int>(random.below(static_cast<std::uint32_t>(n))); };
-  for (int i = 0; i != boxes; ++i) {
-    std::array<int, 3> low{}, high{};
-    for (std::size_t j = 0; j != 3; ++j) {
-      low[j] = below(size[j]);
-      high[j] = std::min(size[j], low[j] + 1 + below(4));
-    }
-    for (int z = low[2]; z < high[2]; ++z)
-      for (int y = low[1]; y < high[1]; ++y)
-        for (int x = low[0]; x < high[0]; ++x) set(map, x, y, z, true);
-  }
-  return map;
-}
-vec3 random_point(random_bits& random, std::array<int, 3> size) {
-  return {cell * size[0] * random.uniform(), cell * size[1] * random.uniform(), cell * size[2] * random.uniform()};
-}
-bool is_free(const map_type& map, const vec3& a, const vec3& b, double radius, occupancy unknown) {
-  return !overlaps(map, octree::capsule{a, b, radius}, {.unknown = unknown});
-}
 
 /// What a path has to be as cheap as: Dijkstra's algorithm, with the exact capsule test.
 double shortest(const map_type& map, std::array<int, 3> size, const vec3& start, const vec3& goal, double radius) {
@@ -72,69 +32,6 @@ double shortest(const map_type& map, std::array<int, 3> size, const vec3& start,
 }
 
 }  // namespace
-
-TEST_CASE("Whether a ball is free is what the exact tests of the map say") {
-  const occupancy unknown = GENERATE(occupancy::occupied, occupancy::free);
-  const double reach = GENERATE(0.15, 1.0);
-  random_bits random{1};
-  const map_type map = maze(random, {40, 40, 24}, 60);
-  const nav::distance_field field{map, {.reach = reach, .unknown = unknown}};
-  std::array<int, 2> seen{};
-  for (const double radius : {0.03, 0.12, 0.25}) {
-    const nav::planning_view view{map, field, radius};
-    for (int i = 0; i != 1500; ++i) {
-      const vec3 a = random_point(random, {44, 44, 26}) - vec3::Constant(0.1);
-      const vec3 b = i % 3 == 0   ? a
-                     : i % 3 == 1 ? vec3{a + 0.1 * random_point(random, {10, 10, 10})}
-                                  : vec3{random_point(random, {40, 40, 24})};
-      const bool expected = is_free(map, a, b, radius, unknown);
-      ++seen[expected ? 1 : 0];
-      CHECK(view.is_free(a, b) == expected);
-      const voxel_key k = *map.grid().key(a);
-      const vec3 middle = map.grid().center(k);
-      CHECK(view.is_free(k) == is_free(map, middle, middle, radius, unknown));
-    }
-  }
-  CHECK(seen[0] > 500);
-  CHECK(seen[1] > 500);
-  const nav::planning_view view{map, field, 0.1};
-  CHECK_FALSE(view.is_free(vec3{std::nan(""), 0.0, 0.0}));
-  CHECK(view.is_free(vec3{0.0, 0.0, 1e6}) == (unknown == occupancy::free));
-}
-
-TEST_CASE("At the edge of the grid a ball is free where the exact tests say so") {
-  const occupancy unknown = GENERATE(occupancy::occupied, occupancy::free);
-  random_bits random{11};
-  map_type map{cell, 5};
-  const std::uint32_t cells = map.grid().cells();
-  for (std::uint32_t z = 0; z != cells; ++z)
-    for (std::uint32_t y = 0; y != cells; ++y)
-      for (std::uint32_t x = 0; x != cells; ++x)
-        map.edit_octant({x, y, z}, [&](octree::block<float>& b) {
-          const auto i = octree::morton_code({x, y, z}) & 63U;
-          b.known |= std::uint64_t{1} << i;
-          b.value[i] = random.uniform() < 0.01 ? 1.0F : -1.0F;
-        });
-  const nav::distance_field field{map, {.reach = 1.0, .unknown = unknown}};
-  const nav::planning_view view{map, field, 0.1};
-  std::array<int, 2> seen{};
-  int wrong = 0, falsely_sure = 0;
-  for (int i = 0; i != 6000; ++i) {
-    vec3 a{random.uniform(-1.6, 1.6), random.uniform(-1.6, 1.6), random.uniform(-1.6, 1.6)};
-    a[i % 3] = (i % 2 == 0 ? 1.6 : -1.6) + random.uniform(-0.15, 0.15);
-    const vec3 b = a + vec3{random.uniform(-0.2, 0.2), random.uniform(-0.2, 0.2), random.uniform(-0.2, 0.2)};
-    for (const vec3& to : {a, b}) {
-      const bool expected = is_free(map, a, to, 0.1, unknown);
-      ++seen[expected ? 1 : 0];
-      wrong += view.is_free(a, to) != expected ? 1 : 0;
-      falsely_sure += view.is_surely_free(a, to) && !expected ? 1 : 0;
-    }
-  }
-  CHECK(wrong == 0);
-  CHECK(falsely_sure == 0);
-  CHECK(seen[0] > 500);
-  if (unknown == occupancy::free) CHECK(seen[1] > 500);
-}
 
 TEST_CASE("A path over the voxels is as short as Dijkstra's, and shortening keeps it free") {
   random_bits random{2};
@@ -620,27 +517,4 @@ TEST_CASE("Shortening ends after as many checks as it may do") {
   }
   CHECK(bounded > 10);
   CHECK(shorter > 10);
-}
-
-TEST_CASE("What the field alone calls free is free") {
-  random_bits random{6};
-  const map_type map = maze(random, {40, 40, 24}, 60);
-  const nav::distance_field field{map, {.reach = 1.0}};
-  const nav::planning_view view{map, field, 0.12};
-  int sure = 0, free = 0;
-  for (int i = 0; i != 2000; ++i) {
-    const vec3 a = random_point(random, {40, 40, 24}), b = a + 0.1 * random_point(random, {8, 8, 8});
-    const bool is_sure = view.is_surely_free(a, b);
-    if (is_sure) CHECK(is_free(map, a, b, 0.12, occupancy::occupied));
-    sure += is_sure ? 1 : 0;
-    free += view.is_free(a, b) ? 1 : 0;
-  }
-  CHECK(sure > 100);
-  CHECK(sure * 10 > free * 7);
-  // Far beyond the grid the length of the way is not a number that steps could add up to.
-  const nav::distance_field open{map, {.reach = 1.0, .unknown = occupancy::free}};
-  const nav::planning_view outside{map, open, 0.12};
-  const vec3 a{-1.0, -1.0, -1.0};
-  CHECK(outside.is_surely_free(a, a));
-  CHECK_FALSE(outside.is_surely_free(a, vec3{-1e200, -1e200, 0.0}));
 }
