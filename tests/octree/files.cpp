@@ -16,7 +16,6 @@
 
 using namespace orbis;
 using namespace orbis::octree;
-using namespace orbis::octree::detail;
 
 namespace {
 
@@ -199,6 +198,7 @@ TEST_CASE("A hostile file takes memory in proportion to its size") {
   CHECK(map->memory_bytes() < 8192 + 400 * data.size());
 
   // Each node is eight leaves of the size of a brick: the most storage a byte can ask for.
+  constexpr int brick_level = 3;  // 8 x 8 x 8 voxels
   std::string bricks{"\xff\xff", 2};
   std::size_t brick_nodes = 1;
   const auto fill = [&](auto&& self, int level) -> void {

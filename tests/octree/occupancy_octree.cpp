@@ -10,7 +10,6 @@
 
 using namespace orbis;
 using namespace orbis::octree;
-using namespace orbis::octree::detail;
 
 namespace {
 

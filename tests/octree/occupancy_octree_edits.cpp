@@ -18,7 +18,6 @@
 
 using namespace orbis;
 using namespace orbis::octree;
-using namespace orbis::octree::detail;
 
 namespace {
 
@@ -226,7 +225,7 @@ TEST_CASE("A mirror that applies the logged changes stays the same map") {
       mirror.edit_octant(octant, [&](octree::block<float>& voxels) {
         for (std::uint64_t rest = mask; rest != 0; rest &= rest - 1) {
           const auto i = static_cast<std::uint32_t>(std::countr_zero(rest));
-          const voxel_key in = voxel_in_brick(i);
+          const voxel_key in = morton_key(i);
           const auto v = map.value(voxel_key{octant.x + in.x, octant.y + in.y, octant.z + in.z});
           voxels.value[i] = v.value_or(0.0F);
           voxels.known = (voxels.known & ~(std::uint64_t{1} << i)) | std::uint64_t{v.has_value()} << i;

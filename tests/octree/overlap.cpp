@@ -9,7 +9,6 @@
 
 using namespace orbis;
 using namespace orbis::octree;
-using namespace orbis::octree::detail;
 
 namespace {
 
