@@ -17,23 +17,23 @@
 
 namespace orbis::io {
 
-ORBIS_INLINE result<bal_problem> parse_bal(std::string_view text, const std::filesystem::path& where) {
+ORBIS_LAZY_INLINE result<bal_problem> parse_bal(std::string_view text, const std::filesystem::path& where) {
   return detail::bal_parser{text, where}.parse();
 }
 
-ORBIS_INLINE result<bal_problem> read_bal(std::istream& in, const std::filesystem::path& where) {
+ORBIS_LAZY_INLINE result<bal_problem> read_bal(std::istream& in, const std::filesystem::path& where) {
   const std::string text{std::istreambuf_iterator<char>{in}, std::istreambuf_iterator<char>{}};
   if (in.bad()) return fail(errc::unreadable, where.string(), "cannot be read");
   return parse_bal(text, where);
 }
 
-ORBIS_INLINE result<bal_problem> read_bal(const std::filesystem::path& path) {
+ORBIS_LAZY_INLINE result<bal_problem> read_bal(const std::filesystem::path& path) {
   const auto text = read_file(path);
   if (!text) return fail(text.error());
   return parse_bal(*text, path);
 }
 
-ORBIS_INLINE std::string format_bal(const bal_problem& problem) {
+ORBIS_LAZY_INLINE std::string format_bal(const bal_problem& problem) {
   std::string text;
   text.reserve(48 * problem.observations.size() + 24 * (9 * problem.cameras.size() + 3 * problem.points.size()) + 64);
   const auto add = [&](auto value, char after) {
@@ -58,7 +58,7 @@ ORBIS_INLINE std::string format_bal(const bal_problem& problem) {
   return text;
 }
 
-ORBIS_INLINE result<void> write_bal(const std::filesystem::path& path, const bal_problem& problem) {
+ORBIS_LAZY_INLINE result<void> write_bal(const std::filesystem::path& path, const bal_problem& problem) {
   const std::string text = format_bal(problem);
   return write_file_atomically(
       path, [&](std::ostream& out) { out.write(text.data(), static_cast<std::streamsize>(text.size())); });

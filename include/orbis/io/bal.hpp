@@ -13,6 +13,7 @@
 #include <string>
 #include <string_view>
 
+#include <orbis/core/inline.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/io/bal_problem.hpp>
 
@@ -21,20 +22,20 @@ namespace orbis::io {
 /// Parses a problem; `where` names the source in errors. Time and memory are proportional to the length of the text,
 /// regardless of the numbers in the first line. Errors, with the line number: malformed; unsupported (compressed, as
 /// are the files on the project's website).
-[[nodiscard]] result<bal_problem> parse_bal(std::string_view text, const std::filesystem::path& where = {});
+ORBIS_LAZY [[nodiscard]] result<bal_problem> parse_bal(std::string_view text, const std::filesystem::path& where = {});
 
 /// Reads a whole stream; see `parse_bal`. Errors: unreadable, malformed, unsupported.
-[[nodiscard]] result<bal_problem> read_bal(std::istream& in, const std::filesystem::path& where = {});
+ORBIS_LAZY [[nodiscard]] result<bal_problem> read_bal(std::istream& in, const std::filesystem::path& where = {});
 
 /// Reads a BAL file; see `parse_bal`. Errors: not_found, unreadable, malformed, unsupported.
-[[nodiscard]] result<bal_problem> read_bal(const std::filesystem::path& path);
+ORBIS_LAZY [[nodiscard]] result<bal_problem> read_bal(const std::filesystem::path& path);
 
 /// The problem as text, with enough digits to recover the same numbers.
 /// @pre the observations' indices are in range
-[[nodiscard]] std::string format_bal(const bal_problem& problem);
+ORBIS_LAZY [[nodiscard]] std::string format_bal(const bal_problem& problem);
 
 /// Writes a BAL file atomically. Errors: write_failed.
-result<void> write_bal(const std::filesystem::path& path, const bal_problem& problem);
+ORBIS_LAZY result<void> write_bal(const std::filesystem::path& path, const bal_problem& problem);
 
 }  // namespace orbis::io
 

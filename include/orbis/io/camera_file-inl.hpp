@@ -104,7 +104,8 @@ class camera_fields {
 
 }  // namespace detail
 
-ORBIS_INLINE result<camera::camera_settings> parse_camera(std::string_view text, const std::filesystem::path& where) {
+ORBIS_LAZY_INLINE result<camera::camera_settings> parse_camera(std::string_view text,
+                                                               const std::filesystem::path& where) {
   const auto parsed = parse_toml(text, where);
   if (!parsed) return fail(parsed.error());
   const toml::table& table = *parsed;
@@ -160,13 +161,14 @@ ORBIS_INLINE result<camera::camera_settings> parse_camera(std::string_view text,
   return settings;
 }
 
-ORBIS_INLINE result<camera::camera_settings> read_camera(const std::filesystem::path& path) {
+ORBIS_LAZY_INLINE result<camera::camera_settings> read_camera(const std::filesystem::path& path) {
   const auto text = read_file(path, max_toml_bytes);
   if (!text) return fail(text.error());
   return parse_camera(*text, path);
 }
 
-ORBIS_INLINE result<void> write_camera(const std::filesystem::path& path, const camera::camera_settings& settings) {
+ORBIS_LAZY_INLINE result<void> write_camera(const std::filesystem::path& path,
+                                            const camera::camera_settings& settings) {
   const auto number = [](double value) {
     char buffer[40];
     std::string text(buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr);

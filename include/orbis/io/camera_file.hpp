@@ -25,6 +25,7 @@
 #include <string_view>
 
 #include <orbis/camera/settings.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/core/result.hpp>
 
 namespace orbis::io {
@@ -32,15 +33,15 @@ namespace orbis::io {
 /// The camera described by `text` in TOML. `where` names the source in errors. Errors: malformed, naming the field
 /// (missing, of the wrong type, NaN, out of range, a distortion list whose length does not fit the model, an unknown
 /// key; more than `max_toml_bytes`); unsupported (an unknown model).
-[[nodiscard]] result<camera::camera_settings> parse_camera(std::string_view text,
-                                                           const std::filesystem::path& where = {});
+ORBIS_LAZY [[nodiscard]] result<camera::camera_settings> parse_camera(std::string_view text,
+                                                                      const std::filesystem::path& where = {});
 
 /// Reads a camera file; see `parse_camera`. Errors: not_found, unreadable, malformed, unsupported.
-[[nodiscard]] result<camera::camera_settings> read_camera(const std::filesystem::path& path);
+ORBIS_LAZY [[nodiscard]] result<camera::camera_settings> read_camera(const std::filesystem::path& path);
 
 /// Writes a camera file atomically. Reading the file returns exactly the same settings (shutter times up to rounding).
 /// Errors: write_failed.
-result<void> write_camera(const std::filesystem::path& path, const camera::camera_settings& settings);
+ORBIS_LAZY result<void> write_camera(const std::filesystem::path& path, const camera::camera_settings& settings);
 
 }  // namespace orbis::io
 

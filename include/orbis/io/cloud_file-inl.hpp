@@ -16,7 +16,7 @@
 
 namespace orbis::io {
 
-ORBIS_INLINE std::optional<cloud_format> cloud_format_by_extension(const std::filesystem::path& path) {
+ORBIS_LAZY_INLINE std::optional<cloud_format> cloud_format_by_extension(const std::filesystem::path& path) {
   const std::string extension = path.extension().string();
   const auto is = [&](std::string_view known) { return std::ranges::equal(extension, known, {}, detail::lower_case); };
   return is(".ply") ? std::optional{cloud_format::ply} : is(".pcd") ? std::optional{cloud_format::pcd} : std::nullopt;
@@ -24,7 +24,8 @@ ORBIS_INLINE std::optional<cloud_format> cloud_format_by_extension(const std::fi
 
 namespace detail {
 
-inline result<cloud_format> detect_cloud_format(std::string_view bytes, const std::filesystem::path& path) {
+template <class = void>
+result<cloud_format> detect_cloud_format(std::string_view bytes, const std::filesystem::path& path) {
   if (bytes.starts_with("ply\n") || bytes.starts_with("ply\r")) return cloud_format::ply;
   if (bytes.starts_with("# .PCD") || bytes.starts_with("VERSION ")) return cloud_format::pcd;
   if (const auto format = cloud_format_by_extension(path)) return *format;
@@ -33,7 +34,7 @@ inline result<cloud_format> detect_cloud_format(std::string_view bytes, const st
 
 }  // namespace detail
 
-ORBIS_INLINE result<point_cloud> read_cloud(const std::filesystem::path& path, const vec3& origin) {
+ORBIS_LAZY_INLINE result<point_cloud> read_cloud(const std::filesystem::path& path, const vec3& origin) {
   const auto bytes = read_file(path);
   if (!bytes) return fail(bytes.error());
   const auto format = detail::detect_cloud_format(*bytes, path);
@@ -42,7 +43,8 @@ ORBIS_INLINE result<point_cloud> read_cloud(const std::filesystem::path& path, c
                                       : parse_pcd(*bytes, path.string(), origin);
 }
 
-ORBIS_INLINE result<cloud_with_fields> read_cloud_with_fields(const std::filesystem::path& path, const vec3& origin) {
+ORBIS_LAZY_INLINE result<cloud_with_fields> read_cloud_with_fields(const std::filesystem::path& path,
+                                                                   const vec3& origin) {
   const auto bytes = read_file(path);
   if (!bytes) return fail(bytes.error());
   const auto format = detail::detect_cloud_format(*bytes, path);
@@ -51,8 +53,8 @@ ORBIS_INLINE result<cloud_with_fields> read_cloud_with_fields(const std::filesys
                                       : parse_pcd_with_fields(*bytes, path.string(), origin);
 }
 
-ORBIS_INLINE result<void> write_cloud(const std::filesystem::path& path, const cloud_with_fields& cloud,
-                                      std::span<const std::uint32_t> indices, const vec3& origin) {
+ORBIS_LAZY_INLINE result<void> write_cloud(const std::filesystem::path& path, const cloud_with_fields& cloud,
+                                           std::span<const std::uint32_t> indices, const vec3& origin) {
   const auto format = cloud_format_by_extension(path);
   if (!format) return fail(errc::invalid_argument, path.string(), "must end in .ply or .pcd");
   return *format == cloud_format::pcd ? write_pcd(path, cloud, indices, origin)

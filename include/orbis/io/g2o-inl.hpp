@@ -16,17 +16,17 @@
 
 namespace orbis::io {
 
-ORBIS_INLINE result<g2o_graph> parse_g2o(std::string_view text, const std::filesystem::path& where) {
+ORBIS_LAZY_INLINE result<g2o_graph> parse_g2o(std::string_view text, const std::filesystem::path& where) {
   return detail::g2o_parser{where}.parse(text);
 }
 
-ORBIS_INLINE result<g2o_graph> read_g2o(const std::filesystem::path& path) {
+ORBIS_LAZY_INLINE result<g2o_graph> read_g2o(const std::filesystem::path& path) {
   const auto text = read_file(path);
   if (!text) return fail(text.error());
   return parse_g2o(*text, path);
 }
 
-ORBIS_INLINE std::string format_g2o(const g2o_graph& graph) {
+ORBIS_LAZY_INLINE std::string format_g2o(const g2o_graph& graph) {
   std::string text;
   const auto add = [&](auto value) {
     char buffer[32];
@@ -61,7 +61,7 @@ ORBIS_INLINE std::string format_g2o(const g2o_graph& graph) {
   return text;
 }
 
-ORBIS_INLINE result<void> write_g2o(const std::filesystem::path& path, const g2o_graph& graph) {
+ORBIS_LAZY_INLINE result<void> write_g2o(const std::filesystem::path& path, const g2o_graph& graph) {
   const std::string text = format_g2o(graph);
   return write_file_atomically(
       path, [&](std::ostream& out) { out.write(text.data(), static_cast<std::streamsize>(text.size())); });

@@ -12,6 +12,7 @@
 #include <string>
 #include <string_view>
 
+#include <orbis/core/inline.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/io/g2o_graph.hpp>
 
@@ -20,17 +21,17 @@ namespace orbis::io {
 /// The graph in `text`; vertices and edges may be in any order. `where` names the source in errors; quaternions of any
 /// positive norm are normalised. Text without lines gives an empty graph. Errors, with the line number: malformed;
 /// unsupported (a vertex or edge type other than those for 3D poses).
-[[nodiscard]] result<g2o_graph> parse_g2o(std::string_view text, const std::filesystem::path& where = {});
+ORBIS_LAZY [[nodiscard]] result<g2o_graph> parse_g2o(std::string_view text, const std::filesystem::path& where = {});
 
 /// Reads a g2o file; see `parse_g2o`. Errors: not_found, unreadable, malformed, unsupported.
-[[nodiscard]] result<g2o_graph> read_g2o(const std::filesystem::path& path);
+ORBIS_LAZY [[nodiscard]] result<g2o_graph> read_g2o(const std::filesystem::path& path);
 
 /// The graph as text, with enough digits to recover the same numbers.
 /// @pre ids and fixed have one entry per vertex
-[[nodiscard]] std::string format_g2o(const g2o_graph& graph);
+ORBIS_LAZY [[nodiscard]] std::string format_g2o(const g2o_graph& graph);
 
 /// Writes a g2o file atomically. Errors: write_failed.
-result<void> write_g2o(const std::filesystem::path& path, const g2o_graph& graph);
+ORBIS_LAZY result<void> write_g2o(const std::filesystem::path& path, const g2o_graph& graph);
 
 }  // namespace orbis::io
 

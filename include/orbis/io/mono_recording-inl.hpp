@@ -16,32 +16,32 @@
 
 namespace orbis::io {
 
-ORBIS_INLINE mono_recording::mono_recording(detail::recording_index index, camera::camera_settings camera,
-                                            mono_format format)
+ORBIS_LAZY_INLINE mono_recording::mono_recording(detail::recording_index index, camera::camera_settings camera,
+                                                 mono_format format)
     : index_{std::move(index)}, camera_{std::move(camera)}, format_{format} {
   assert(!index_.frames.empty());
 }
 
-ORBIS_INLINE std::vector<std::filesystem::path> mono_recording::files() const {
+ORBIS_LAZY_INLINE std::vector<std::filesystem::path> mono_recording::files() const {
   std::vector<std::filesystem::path> all = index_.files;
   for (const detail::recording_entry& entry : index_.frames) all.push_back(entry.color);
   return all;
 }
 
-ORBIS_INLINE result<camera::mono_frame> mono_recording::frame(std::size_t i) const {
+ORBIS_LAZY_INLINE result<camera::mono_frame> mono_recording::frame(std::size_t i) const {
   auto image = color(i);
   if (!image) return fail(image.error());
   const detail::recording_entry& entry = index_.frames[i];
   return camera::mono_frame{entry.timestamp, *std::move(image), entry.T_world_camera};
 }
 
-ORBIS_INLINE result<image<rgb8>> mono_recording::color(std::size_t i) const {
+ORBIS_LAZY_INLINE result<image<rgb8>> mono_recording::color(std::size_t i) const {
   assert(i < size());
   const std::filesystem::path& file = index_.frames[i].color;
   return detail::sized(read_color(file), file, camera_.model.width(), camera_.model.height());
 }
 
-ORBIS_INLINE mono_format detect_mono_format(const std::filesystem::path& folder) {
+ORBIS_LAZY_INLINE mono_format detect_mono_format(const std::filesystem::path& folder) {
   if (!detail::asl_camera_folder(folder).empty()) return mono_format::asl;
   if (detail::is_kitti_camera(folder)) return mono_format::kitti;
   if (!detail::find_image_list(folder).empty()) return mono_format::tum;
@@ -50,8 +50,8 @@ ORBIS_INLINE mono_format detect_mono_format(const std::filesystem::path& folder)
   return mono_format::automatic;
 }
 
-ORBIS_INLINE result<mono_recording> open_mono_recording(const std::filesystem::path& folder,
-                                                        const mono_recording_options& options) {
+ORBIS_LAZY_INLINE result<mono_recording> open_mono_recording(const std::filesystem::path& folder,
+                                                             const mono_recording_options& options) {
   if (const auto is_folder = detail::check_folder(folder); !is_folder) return fail(is_folder.error());
   std::vector<std::filesystem::path> files;
   auto camera = detail::given_camera(folder, options.camera, files);

@@ -22,6 +22,7 @@
 #include <orbis/camera/mono_frame.hpp>
 #include <orbis/camera/settings.hpp>
 #include <orbis/core/image.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
@@ -56,7 +57,7 @@ struct mono_recording_options {
 class mono_recording {
  public:
   /// @pre !index.frames.empty()
-  mono_recording(detail::recording_index index, camera::camera_settings camera, mono_format format);
+  ORBIS_LAZY mono_recording(detail::recording_index index, camera::camera_settings camera, mono_format format);
 
   [[nodiscard]] std::size_t size() const noexcept { return index_.frames.size(); }
   /// Time in seconds. @pre i < size()
@@ -71,13 +72,13 @@ class mono_recording {
   /// Warnings: skipped lines, images without a time stamp.
   [[nodiscard]] std::span<const std::string> notes() const noexcept { return index_.notes; }
   /// All files of the recording: lists, poses, camera, and all images.
-  [[nodiscard]] std::vector<std::filesystem::path> files() const;
+  ORBIS_LAZY [[nodiscard]] std::vector<std::filesystem::path> files() const;
 
   /// Reads frame `i`. Errors: not_found, unreadable, malformed (damaged, or its size differs from the camera's),
   /// unsupported. @pre i < size()
-  [[nodiscard]] result<camera::mono_frame> frame(std::size_t i) const;
+  ORBIS_LAZY [[nodiscard]] result<camera::mono_frame> frame(std::size_t i) const;
   /// Reads only the image of frame `i`. Errors: those of `frame`. @pre i < size()
-  [[nodiscard]] result<image<rgb8>> color(std::size_t i) const;
+  ORBIS_LAZY [[nodiscard]] result<image<rgb8>> color(std::size_t i) const;
 
  private:
   detail::recording_index index_;
@@ -86,7 +87,7 @@ class mono_recording {
 };
 
 /// Detects the format of the images of one camera in `folder`; `automatic` if none is recognised.
-[[nodiscard]] mono_format detect_mono_format(const std::filesystem::path& folder);
+ORBIS_LAZY [[nodiscard]] mono_format detect_mono_format(const std::filesystem::path& folder);
 
 /// Opens the recording in `folder` as a recording of one camera: reads its lists, poses and camera, but not its images
 /// (except one image of a KITTI sequence, to determine the image size). Ignores depth and the images of other cameras.
@@ -95,8 +96,8 @@ class mono_recording {
 /// format's own files, or the folder's name. If none does, the function fails.
 /// Errors: not_found, unreadable, unsupported (no known format, or a camera of an unknown model), no_data (no images),
 /// malformed (with file and line), invalid_argument (no camera known).
-[[nodiscard]] result<mono_recording> open_mono_recording(const std::filesystem::path& folder,
-                                                         const mono_recording_options& options = {});
+ORBIS_LAZY [[nodiscard]] result<mono_recording> open_mono_recording(const std::filesystem::path& folder,
+                                                                    const mono_recording_options& options = {});
 
 }  // namespace orbis::io
 

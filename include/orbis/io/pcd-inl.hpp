@@ -25,7 +25,7 @@
 
 namespace orbis::io {
 
-ORBIS_INLINE result<point_cloud> parse_pcd(std::string_view bytes, const std::string& where, const vec3& origin) {
+ORBIS_LAZY_INLINE result<point_cloud> parse_pcd(std::string_view bytes, const std::string& where, const vec3& origin) {
   auto columns = detail::read_pcd_columns(bytes, where, false);
   if (!columns) return fail(columns.error());
   auto read = detail::to_cloud(*std::move(columns), where, origin);
@@ -33,14 +33,14 @@ ORBIS_INLINE result<point_cloud> parse_pcd(std::string_view bytes, const std::st
   return std::move(read->cloud);
 }
 
-ORBIS_INLINE result<cloud_with_fields> parse_pcd_with_fields(std::string_view bytes, const std::string& where,
-                                                             const vec3& origin) {
+ORBIS_LAZY_INLINE result<cloud_with_fields> parse_pcd_with_fields(std::string_view bytes, const std::string& where,
+                                                                  const vec3& origin) {
   auto columns = detail::read_pcd_columns(bytes, where, true);
   if (!columns) return fail(columns.error());
   return detail::to_cloud(*std::move(columns), where, origin);
 }
 
-ORBIS_INLINE result<point_cloud> read_pcd(const std::filesystem::path& path) {
+ORBIS_LAZY_INLINE result<point_cloud> read_pcd(const std::filesystem::path& path) {
   const auto bytes = read_file(path);
   if (!bytes) return fail(bytes.error());
   return parse_pcd(*bytes, path.string());
@@ -99,14 +99,14 @@ result<void> write_indexed_pcd(const std::filesystem::path& path, const point_cl
 
 }  // namespace detail
 
-ORBIS_INLINE result<void> write_pcd(const std::filesystem::path& path, const point_cloud& cloud) {
+ORBIS_LAZY_INLINE result<void> write_pcd(const std::filesystem::path& path, const point_cloud& cloud) {
   assert(cloud.colors.empty() || cloud.colors.size() == cloud.size());
   return detail::write_indexed_pcd(path, cloud, {}, cloud_with_fields{}.viewpoint, zeros<vec3>(), cloud.size(),
                                    [](std::size_t i) { return i; });
 }
 
-ORBIS_INLINE result<void> write_pcd(const std::filesystem::path& path, const cloud_with_fields& cloud,
-                                    std::span<const std::uint32_t> indices, const vec3& origin) {
+ORBIS_LAZY_INLINE result<void> write_pcd(const std::filesystem::path& path, const cloud_with_fields& cloud,
+                                         std::span<const std::uint32_t> indices, const vec3& origin) {
   return detail::write_indexed_pcd(path, cloud.cloud, cloud.fields, cloud.viewpoint, origin, indices.size(),
                                    [&](std::size_t i) { return std::size_t{indices[i]}; });
 }

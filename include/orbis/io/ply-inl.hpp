@@ -21,7 +21,7 @@
 
 namespace orbis::io {
 
-ORBIS_INLINE result<point_cloud> parse_ply(std::string_view bytes, const std::string& where, const vec3& origin) {
+ORBIS_LAZY_INLINE result<point_cloud> parse_ply(std::string_view bytes, const std::string& where, const vec3& origin) {
   auto columns = detail::read_ply_columns(bytes, where, false);
   if (!columns) return fail(columns.error());
   auto read = detail::to_cloud(*std::move(columns), where, origin);
@@ -29,14 +29,14 @@ ORBIS_INLINE result<point_cloud> parse_ply(std::string_view bytes, const std::st
   return std::move(read->cloud);
 }
 
-ORBIS_INLINE result<cloud_with_fields> parse_ply_with_fields(std::string_view bytes, const std::string& where,
-                                                             const vec3& origin) {
+ORBIS_LAZY_INLINE result<cloud_with_fields> parse_ply_with_fields(std::string_view bytes, const std::string& where,
+                                                                  const vec3& origin) {
   auto columns = detail::read_ply_columns(bytes, where, true);
   if (!columns) return fail(columns.error());
   return detail::to_cloud(*std::move(columns), where, origin);
 }
 
-ORBIS_INLINE result<point_cloud> read_ply(const std::filesystem::path& path) {
+ORBIS_LAZY_INLINE result<point_cloud> read_ply(const std::filesystem::path& path) {
   const auto bytes = read_file(path);
   if (!bytes) return fail(bytes.error());
   return parse_ply(*bytes, path.string());
@@ -44,8 +44,8 @@ ORBIS_INLINE result<point_cloud> read_ply(const std::filesystem::path& path) {
 
 namespace detail {
 
-ORBIS_INLINE result<void> write_ply_vertices(const std::filesystem::path& path, const ply_vertices& vertices,
-                                             const ply_options& options) {
+ORBIS_LAZY_INLINE result<void> write_ply_vertices(const std::filesystem::path& path, const ply_vertices& vertices,
+                                                  const ply_options& options) {
   const bool binary = options.encoding == ply_encoding::binary;
   const bool far = !options.origin.isZero();
   const std::string axis = far ? "\nproperty double " : "\nproperty float ";
@@ -112,16 +112,17 @@ ORBIS_INLINE result<void> write_ply_vertices(const std::filesystem::path& path, 
 
 }  // namespace detail
 
-ORBIS_INLINE result<void> write_ply(const std::filesystem::path& path, const point_cloud& cloud,
-                                    const ply_options& options) {
+ORBIS_LAZY_INLINE result<void> write_ply(const std::filesystem::path& path, const point_cloud& cloud,
+                                         const ply_options& options) {
   return write_ply(path, cloud.points, std::span<const rgb8>{cloud.colors}, options);
 }
 
 namespace detail {
 
-inline result<void> write_indexed_ply(const std::filesystem::path& path, const point_cloud& cloud,
-                                      std::span<const cloud_field> fields, std::span<const std::uint32_t> indices,
-                                      const ply_options& options) {
+template <class = void>
+result<void> write_indexed_ply(const std::filesystem::path& path, const point_cloud& cloud,
+                               std::span<const cloud_field> fields, std::span<const std::uint32_t> indices,
+                               const ply_options& options) {
   const auto read = [&](std::size_t begin, std::span<ply_vertex> out) {
     for (std::size_t i = 0; i != out.size(); ++i) {
       const std::uint32_t at = indices[begin + i];
@@ -137,13 +138,13 @@ inline result<void> write_indexed_ply(const std::filesystem::path& path, const p
 
 }  // namespace detail
 
-ORBIS_INLINE result<void> write_ply(const std::filesystem::path& path, const point_cloud& cloud,
-                                    std::span<const std::uint32_t> indices, const ply_options& options) {
+ORBIS_LAZY_INLINE result<void> write_ply(const std::filesystem::path& path, const point_cloud& cloud,
+                                         std::span<const std::uint32_t> indices, const ply_options& options) {
   return detail::write_indexed_ply(path, cloud, {}, indices, options);
 }
 
-ORBIS_INLINE result<void> write_ply(const std::filesystem::path& path, const cloud_with_fields& cloud,
-                                    std::span<const std::uint32_t> indices, const ply_options& options) {
+ORBIS_LAZY_INLINE result<void> write_ply(const std::filesystem::path& path, const cloud_with_fields& cloud,
+                                         std::span<const std::uint32_t> indices, const ply_options& options) {
   return detail::write_indexed_ply(path, cloud.cloud, cloud.fields, indices, options);
 }
 

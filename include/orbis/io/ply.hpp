@@ -16,6 +16,7 @@
 #include <string_view>
 
 #include <orbis/core/image.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/point_cloud.hpp>
 #include <orbis/core/result.hpp>
@@ -39,16 +40,17 @@ struct ply_options {
 /// first of 0 to 255, 0 to 4095 and 0 to 65535 that contains all values. Ignores everything else. `origin` is
 /// subtracted from the coordinates before they are converted to float, whose resolution is half a metre at 5000 km.
 /// Errors: malformed (damaged, truncated), unsupported (no vertices with x, y and z).
-[[nodiscard]] result<point_cloud> parse_ply(std::string_view bytes, const std::string& where = {},
-                                            const vec3& origin = zeros<vec3>());
+ORBIS_LAZY [[nodiscard]] result<point_cloud> parse_ply(std::string_view bytes, const std::string& where = {},
+                                                       const vec3& origin = zeros<vec3>());
 
 /// Parses a PLY file like `parse_ply`, and keeps all other properties of the vertices except lists. Notes report
 /// omitted data, and colours whose range differs from that of their type. Errors: those of `parse_ply`.
-[[nodiscard]] result<cloud_with_fields> parse_ply_with_fields(std::string_view bytes, const std::string& where = {},
-                                                              const vec3& origin = zeros<vec3>());
+ORBIS_LAZY [[nodiscard]] result<cloud_with_fields> parse_ply_with_fields(std::string_view bytes,
+                                                                         const std::string& where = {},
+                                                                         const vec3& origin = zeros<vec3>());
 
 /// Reads a PLY file; see `parse_ply`. Errors: not_found, unreadable, malformed, unsupported.
-[[nodiscard]] result<point_cloud> read_ply(const std::filesystem::path& path);
+ORBIS_LAZY [[nodiscard]] result<point_cloud> read_ply(const std::filesystem::path& path);
 
 namespace detail {
 
@@ -68,8 +70,8 @@ struct ply_vertices {
 };
 
 /// Writes vertices in blocks.
-[[nodiscard]] result<void> write_ply_vertices(const std::filesystem::path& path, const ply_vertices& vertices,
-                                              const ply_options& options);
+ORBIS_LAZY [[nodiscard]] result<void> write_ply_vertices(const std::filesystem::path& path,
+                                                         const ply_vertices& vertices, const ply_options& options);
 
 }  // namespace detail
 
@@ -92,17 +94,18 @@ result<void> write_ply(const std::filesystem::path& path, const Points& points, 
 }
 
 /// Writes a cloud as a PLY file: `x y z`, with `red green blue` if it has colours.
-result<void> write_ply(const std::filesystem::path& path, const point_cloud& cloud, const ply_options& options = {});
+ORBIS_LAZY result<void> write_ply(const std::filesystem::path& path, const point_cloud& cloud,
+                                  const ply_options& options = {});
 
 /// Writes the points with the given indices, such as those that a filter kept, without copying them to another cloud.
 /// @pre each index < cloud.size()
-result<void> write_ply(const std::filesystem::path& path, const point_cloud& cloud,
-                       std::span<const std::uint32_t> indices, const ply_options& options = {});
+ORBIS_LAZY result<void> write_ply(const std::filesystem::path& path, const point_cloud& cloud,
+                                  std::span<const std::uint32_t> indices, const ply_options& options = {});
 
 /// Writes the points with the given indices, with all of their fields: a field `f` with several values per point as the
 /// properties `f_0`, `f_1`, ..., 64-bit integers as double. @pre each index < cloud.cloud.size()
-result<void> write_ply(const std::filesystem::path& path, const cloud_with_fields& cloud,
-                       std::span<const std::uint32_t> indices, const ply_options& options = {});
+ORBIS_LAZY result<void> write_ply(const std::filesystem::path& path, const cloud_with_fields& cloud,
+                                  std::span<const std::uint32_t> indices, const ply_options& options = {});
 
 }  // namespace orbis::io
 

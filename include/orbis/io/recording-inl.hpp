@@ -20,21 +20,21 @@
 
 namespace orbis::io {
 
-ORBIS_INLINE recording::recording(detail::recording_index index, camera::camera_settings camera,
-                                  recording_format format)
+ORBIS_LAZY_INLINE recording::recording(detail::recording_index index, camera::camera_settings camera,
+                                       recording_format format)
     : index_{std::move(index)}, camera_{std::move(camera)}, format_{format} {
   assert(!index_.frames.empty());
   if (const auto* depth = camera_.model.get_if<camera::pinhole>(); index_.color && depth != nullptr)
     registration_ = std::make_shared<const detail::color_registration>(*index_.color, *depth);
 }
 
-ORBIS_INLINE std::vector<std::filesystem::path> recording::files() const {
+ORBIS_LAZY_INLINE std::vector<std::filesystem::path> recording::files() const {
   std::vector<std::filesystem::path> all = index_.files;
   for (const detail::recording_entry& entry : index_.frames) all.insert(all.end(), {entry.color, entry.depth});
   return all;
 }
 
-ORBIS_INLINE result<camera::rgbd_frame> recording::frame(std::size_t i) const {
+ORBIS_LAZY_INLINE result<camera::rgbd_frame> recording::frame(std::size_t i) const {
   assert(i < size());
   const detail::recording_entry& entry = index_.frames[i];
   auto depth = read_sized_depth(entry.depth);
@@ -49,7 +49,7 @@ ORBIS_INLINE result<camera::rgbd_frame> recording::frame(std::size_t i) const {
                             .T_world_camera = entry.T_world_camera};
 }
 
-ORBIS_INLINE result<image<rgb8>> recording::color(std::size_t i) const {
+ORBIS_LAZY_INLINE result<image<rgb8>> recording::color(std::size_t i) const {
   assert(i < size());
   const detail::recording_entry& entry = index_.frames[i];
   if (!registration_ || !registration_->needs_depth()) return read_registered(entry.color, {});
@@ -58,7 +58,7 @@ ORBIS_INLINE result<image<rgb8>> recording::color(std::size_t i) const {
   return read_registered(entry.color, depth->view());
 }
 
-ORBIS_INLINE void recording::iterator::read() {
+ORBIS_LAZY_INLINE void recording::iterator::read() {
   frame_.reset();
   if (i_ == of_->size()) return;
   auto frame = of_->frame(i_);
@@ -68,19 +68,19 @@ ORBIS_INLINE void recording::iterator::read() {
     of_->status_ = fail(std::move(frame.error()));
 }
 
-ORBIS_INLINE result<image<std::uint16_t>> recording::read_sized_depth(const std::filesystem::path& path) const {
+ORBIS_LAZY_INLINE result<image<std::uint16_t>> recording::read_sized_depth(const std::filesystem::path& path) const {
   return detail::sized(read_depth(path), path, camera_.model.width(), camera_.model.height());
 }
 
-ORBIS_INLINE result<image<rgb8>> recording::read_registered(const std::filesystem::path& path,
-                                                            image_view<const std::uint16_t> depth) const {
+ORBIS_LAZY_INLINE result<image<rgb8>> recording::read_registered(const std::filesystem::path& path,
+                                                                 image_view<const std::uint16_t> depth) const {
   const camera::intrinsics& k = registration_ ? registration_->color().k() : camera_.model.k();
   auto image = detail::sized(read_color(path), path, k.width, k.height);
   if (image && registration_) image = registration_->register_color(image->view(), depth, camera_.depth_scale);
   return image;
 }
 
-ORBIS_INLINE recording_format detect_format(const std::filesystem::path& folder) {
+ORBIS_LAZY_INLINE recording_format detect_format(const std::filesystem::path& folder) {
   if (detail::is_icl_nuim(folder)) return recording_format::icl_nuim;
   if (detail::is_tum(folder)) return recording_format::tum;
   if (detail::is_seven_scenes(folder)) return recording_format::seven_scenes;
@@ -91,8 +91,8 @@ ORBIS_INLINE recording_format detect_format(const std::filesystem::path& folder)
 
 namespace detail {
 
-ORBIS_INLINE result<recording_index> index_recording(const std::filesystem::path& folder, recording_format& format,
-                                                     double max_time_difference, double fps) {
+ORBIS_LAZY_INLINE result<recording_index> index_recording(const std::filesystem::path& folder, recording_format& format,
+                                                          double max_time_difference, double fps) {
   if (format == recording_format::automatic) format = detect_format(folder);
   switch (format) {
     case recording_format::tum: return index_tum(folder, max_time_difference, fps);
@@ -110,7 +110,8 @@ ORBIS_INLINE result<recording_index> index_recording(const std::filesystem::path
 
 }  // namespace detail
 
-ORBIS_INLINE result<recording> open_recording(const std::filesystem::path& folder, const recording_options& options) {
+ORBIS_LAZY_INLINE result<recording> open_recording(const std::filesystem::path& folder,
+                                                   const recording_options& options) {
   if (const auto is_folder = detail::check_folder(folder); !is_folder) return fail(is_folder.error());
   std::vector<std::filesystem::path> files;
   auto camera = detail::given_camera(folder, options.camera, files);

@@ -22,6 +22,7 @@
 #include <orbis/camera/rgbd_frame.hpp>
 #include <orbis/camera/settings.hpp>
 #include <orbis/core/image.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
 #include <orbis/io/detail/recordings/recording_index.hpp>
@@ -60,7 +61,7 @@ struct recording_options {
 class recording {
  public:
   /// @pre !index.frames.empty()
-  recording(detail::recording_index index, camera::camera_settings camera, recording_format format);
+  ORBIS_LAZY recording(detail::recording_index index, camera::camera_settings camera, recording_format format);
 
   [[nodiscard]] std::size_t size() const noexcept { return index_.frames.size(); }
   /// Time of the colour image, seconds. @pre i < size()
@@ -73,13 +74,13 @@ class recording {
   /// Warnings: images without a partner, skipped lines, depth that is not registered.
   [[nodiscard]] std::span<const std::string> notes() const noexcept { return index_.notes; }
   /// All files of the recording: lists, poses, camera, and all images.
-  [[nodiscard]] std::vector<std::filesystem::path> files() const;
+  ORBIS_LAZY [[nodiscard]] std::vector<std::filesystem::path> files() const;
 
   /// Reads frame `i`. Colour and depth have the camera's size. Errors: not_found, unreadable,
   /// malformed (damaged, or its size differs from the camera's), unsupported. @pre i < size()
-  [[nodiscard]] result<camera::rgbd_frame> frame(std::size_t i) const;
+  ORBIS_LAZY [[nodiscard]] result<camera::rgbd_frame> frame(std::size_t i) const;
   /// Reads only the colour image of frame `i`. Errors: those of `frame`. @pre i < size()
-  [[nodiscard]] result<image<rgb8>> color(std::size_t i) const;
+  ORBIS_LAZY [[nodiscard]] result<image<rgb8>> color(std::size_t i) const;
 
   /// Single-pass iterator that reads each frame as it advances. Iteration ends at the first frame that cannot be read;
   /// the recording's `status` then contains the reason. A reference to a frame is valid until the iterator advances.
@@ -93,19 +94,19 @@ class recording {
     using pointer = const camera::rgbd_frame*;
 
     iterator() = default;
-    explicit iterator(recording& of) : of_{&of} { read(); }
+    ORBIS_LAZY explicit iterator(recording& of) : of_{&of} { read(); }
     [[nodiscard]] reference operator*() const { return *frame_; }
     [[nodiscard]] pointer operator->() const { return frame_.get(); }
-    iterator& operator++() {
+    ORBIS_LAZY iterator& operator++() {
       ++i_;
       read();
       return *this;
     }
-    void operator++(int) { ++*this; }
+    ORBIS_LAZY void operator++(int) { ++*this; }
     [[nodiscard]] friend bool operator==(const iterator& it, std::default_sentinel_t) noexcept { return !it.frame_; }
 
    private:
-    void read();
+    ORBIS_LAZY void read();
 
     recording* of_ = nullptr;
     std::size_t i_ = 0;
@@ -113,7 +114,7 @@ class recording {
   };
 
   /// Restarts the iteration and clears `status`. The recording must outlive the iterator and must not be moved.
-  [[nodiscard]] iterator begin() {
+  ORBIS_LAZY [[nodiscard]] iterator begin() {
     status_ = {};
     return iterator(*this);
   }
@@ -122,10 +123,10 @@ class recording {
   [[nodiscard]] const result<void>& status() const noexcept { return status_; }
 
  private:
-  [[nodiscard]] result<image<std::uint16_t>> read_sized_depth(const std::filesystem::path& path) const;
+  ORBIS_LAZY [[nodiscard]] result<image<std::uint16_t>> read_sized_depth(const std::filesystem::path& path) const;
   /// Reads a colour image; resamples it to the depth camera if `registration_` is set.
-  [[nodiscard]] result<image<rgb8>> read_registered(const std::filesystem::path& path,
-                                                    image_view<const std::uint16_t> depth) const;
+  ORBIS_LAZY [[nodiscard]] result<image<rgb8>> read_registered(const std::filesystem::path& path,
+                                                               image_view<const std::uint16_t> depth) const;
 
   detail::recording_index index_;
   camera::camera_settings camera_;
@@ -135,14 +136,15 @@ class recording {
 };
 
 /// Detects the format of the recording in `folder`; `automatic` if none is recognised.
-[[nodiscard]] recording_format detect_format(const std::filesystem::path& folder);
+ORBIS_LAZY [[nodiscard]] recording_format detect_format(const std::filesystem::path& folder);
 
 namespace detail {
 
 /// The index of the recording in `folder`. If `format` is `automatic`, sets it to the detected format. `fps`: frame
 /// rate of images without time stamps. Errors: those of `open_recording`.
-[[nodiscard]] result<recording_index> index_recording(const std::filesystem::path& folder, recording_format& format,
-                                                      double max_time_difference, double fps);
+ORBIS_LAZY [[nodiscard]] result<recording_index> index_recording(const std::filesystem::path& folder,
+                                                                 recording_format& format, double max_time_difference,
+                                                                 double fps);
 
 }  // namespace detail
 
@@ -153,8 +155,8 @@ namespace detail {
 /// in the path), with a note. If none does, the function fails. A note reports a time between frames that does not
 /// match the camera's frame rate. Errors: not_found, unreadable, unsupported (no known format), no_data (no frames),
 /// malformed (with file and line), invalid_argument (no camera known).
-[[nodiscard]] result<recording> open_recording(const std::filesystem::path& folder,
-                                               const recording_options& options = {});
+ORBIS_LAZY [[nodiscard]] result<recording> open_recording(const std::filesystem::path& folder,
+                                                          const recording_options& options = {});
 
 }  // namespace orbis::io
 

@@ -31,14 +31,16 @@ namespace detail {
 // camera's frame, metres.
 
 /// Returns true if `folder` looks like a plain folder of stereo images.
-[[nodiscard]] inline bool is_image_pairs(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] bool is_image_pairs(const std::filesystem::path& folder) {
   const bool lists = present(folder / "right.txt") && !first_present(folder, {"left.txt", "rgb.txt"}).empty();
   return lists || (present(folder / "right") && !first_present(folder, {"left", "rgb"}).empty());
 }
 
 /// The images in `folder`, ordered by name (`order_by_name`). Errors: no_data.
-[[nodiscard]] inline result<std::vector<stamped_file>> named_images(const std::filesystem::path& folder, double fps,
-                                                                    std::vector<std::string>& notes) {
+template <class = void>
+[[nodiscard]] result<std::vector<stamped_file>> named_images(const std::filesystem::path& folder, double fps,
+                                                             std::vector<std::string>& notes) {
   const keyed_images images = order_by_name(images_in(folder));
   if (images.paths.empty() || images.keys_are == image_keys::alphabet)
     return fail(errc::no_data, folder.string(),
@@ -49,9 +51,9 @@ namespace detail {
 
 /// The index of a plain folder of stereo images. The camera `given` replaces `camera.toml`. Errors: not_found (a file),
 /// unreadable, no_data, malformed (with file and line), invalid_argument (no camera, or no baseline).
-[[nodiscard]] inline result<stereo_index> index_image_pairs(const std::filesystem::path& folder,
-                                                            double max_time_difference,
-                                                            const std::optional<camera::camera_settings>& given) {
+template <class = void>
+[[nodiscard]] result<stereo_index> index_image_pairs(const std::filesystem::path& folder, double max_time_difference,
+                                                     const std::optional<camera::camera_settings>& given) {
   stereo_index index;
   recording_index& images = index.images;
   const auto right_file = folder / "camera_right.toml", place_file = folder / "T_left_right.txt";
@@ -99,8 +101,8 @@ namespace detail {
 
 }  // namespace detail
 
-ORBIS_INLINE stereo_recording::stereo_recording(detail::stereo_index index, camera::rectification straight,
-                                                stereo_format format)
+ORBIS_LAZY_INLINE stereo_recording::stereo_recording(detail::stereo_index index, camera::rectification straight,
+                                                     stereo_format format)
     : index_{std::move(index)}, straight_{std::move(straight)}, format_{format} {
   assert(!index_.images.frames.empty());
   const so3& turn = straight_.R_left_rectified();
@@ -111,13 +113,13 @@ ORBIS_INLINE stereo_recording::stereo_recording(detail::stereo_index index, came
     if (f.T_world_camera) f.T_world_camera = turned(*f.T_world_camera);
 }
 
-ORBIS_INLINE std::vector<std::filesystem::path> stereo_recording::files() const {
+ORBIS_LAZY_INLINE std::vector<std::filesystem::path> stereo_recording::files() const {
   std::vector<std::filesystem::path> all = index_.images.files;
   for (const auto& entry : index_.images.frames) all.insert(all.end(), {entry.color, entry.depth});
   return all;
 }
 
-ORBIS_INLINE result<camera::stereo_frame> stereo_recording::frame(std::size_t i) const {
+ORBIS_LAZY_INLINE result<camera::stereo_frame> stereo_recording::frame(std::size_t i) const {
   auto a = left(i);
   if (!a) return fail(a.error());
   const auto& entry = index_.images.frames[i];
@@ -127,27 +129,27 @@ ORBIS_INLINE result<camera::stereo_frame> stereo_recording::frame(std::size_t i)
   return camera::stereo_frame{entry.timestamp, *std::move(a), *std::move(b), entry.T_world_camera};
 }
 
-ORBIS_INLINE result<image<rgb8>> stereo_recording::left(std::size_t i) const {
+ORBIS_LAZY_INLINE result<image<rgb8>> stereo_recording::left(std::size_t i) const {
   assert(i < size());
   auto a = read(index_.images.frames[i].color, index_.cameras.left);
   if (a && !straight_.is_identity()) a = straight_.left().bilinear(a->view());
   return a;
 }
 
-ORBIS_INLINE result<image<rgb8>> stereo_recording::read(const std::filesystem::path& path,
-                                                        const camera::any_camera& camera) {
+ORBIS_LAZY_INLINE result<image<rgb8>> stereo_recording::read(const std::filesystem::path& path,
+                                                             const camera::any_camera& camera) {
   return detail::sized(read_color(path), path, camera.width(), camera.height());
 }
 
-ORBIS_INLINE stereo_format detect_stereo_format(const std::filesystem::path& folder) {
+ORBIS_LAZY_INLINE stereo_format detect_stereo_format(const std::filesystem::path& folder) {
   if (detail::is_asl(folder)) return stereo_format::asl;
   if (detail::is_kitti(folder)) return stereo_format::kitti;
   if (detail::is_image_pairs(folder)) return stereo_format::pairs;
   return stereo_format::automatic;
 }
 
-ORBIS_INLINE result<stereo_recording> open_stereo_recording(const std::filesystem::path& folder,
-                                                            const stereo_recording_options& options) {
+ORBIS_LAZY_INLINE result<stereo_recording> open_stereo_recording(const std::filesystem::path& folder,
+                                                                 const stereo_recording_options& options) {
   if (const auto is_folder = detail::check_folder(folder); !is_folder) return fail(is_folder.error());
   const stereo_format format =
       options.format == stereo_format::automatic ? detect_stereo_format(folder) : options.format;

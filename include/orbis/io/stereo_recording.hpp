@@ -24,6 +24,7 @@
 #include <orbis/camera/stereo.hpp>
 #include <orbis/camera/stereo_frame.hpp>
 #include <orbis/core/image.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
 #include <orbis/io/detail/recordings/stereo_index.hpp>
@@ -56,7 +57,7 @@ struct stereo_recording_options {
 class stereo_recording {
  public:
   /// @pre !index.images.frames.empty(); `straight` is the rectification of `index.cameras`
-  stereo_recording(detail::stereo_index index, camera::rectification straight, stereo_format format);
+  ORBIS_LAZY stereo_recording(detail::stereo_index index, camera::rectification straight, stereo_format format);
 
   [[nodiscard]] std::size_t size() const noexcept { return index_.images.frames.size(); }
   /// Time of the left image, seconds. @pre i < size()
@@ -76,16 +77,17 @@ class stereo_recording {
   /// Warnings: images without a partner, skipped lines.
   [[nodiscard]] std::span<const std::string> notes() const noexcept { return index_.images.notes; }
   /// All files of the recording: lists, poses, cameras, and all images.
-  [[nodiscard]] std::vector<std::filesystem::path> files() const;
+  ORBIS_LAZY [[nodiscard]] std::vector<std::filesystem::path> files() const;
 
   /// Reads frame `i`. Errors: not_found, unreadable, malformed (damaged, or its size differs from its camera's),
   /// unsupported. @pre i < size()
-  [[nodiscard]] result<camera::stereo_frame> frame(std::size_t i) const;
+  ORBIS_LAZY [[nodiscard]] result<camera::stereo_frame> frame(std::size_t i) const;
   /// Reads only the left image of frame `i`. Errors: those of `frame`. @pre i < size()
-  [[nodiscard]] result<image<rgb8>> left(std::size_t i) const;
+  ORBIS_LAZY [[nodiscard]] result<image<rgb8>> left(std::size_t i) const;
 
  private:
-  [[nodiscard]] static result<image<rgb8>> read(const std::filesystem::path& path, const camera::any_camera& camera);
+  ORBIS_LAZY [[nodiscard]] static result<image<rgb8>> read(const std::filesystem::path& path,
+                                                           const camera::any_camera& camera);
 
   detail::stereo_index index_;
   camera::rectification straight_;
@@ -93,15 +95,15 @@ class stereo_recording {
 };
 
 /// Detects the format of the stereo recording in `folder`; `automatic` if none is recognised.
-[[nodiscard]] stereo_format detect_stereo_format(const std::filesystem::path& folder);
+ORBIS_LAZY [[nodiscard]] stereo_format detect_stereo_format(const std::filesystem::path& folder);
 
 /// Opens the stereo recording in `folder`: reads its lists, poses and cameras, and rectifies the cameras. The only
 /// image that it reads is the first left one, to check its size. Errors: not_found, unreadable, unsupported (no known
 /// format, or a camera of an unknown model), no_data (no pairs), malformed (with file and line; an image whose size
 /// differs from its camera's), invalid_argument (no camera known, a camera option for a format with its own cameras, or
 /// cameras that cannot be rectified).
-[[nodiscard]] result<stereo_recording> open_stereo_recording(const std::filesystem::path& folder,
-                                                             const stereo_recording_options& options = {});
+ORBIS_LAZY [[nodiscard]] result<stereo_recording> open_stereo_recording(const std::filesystem::path& folder,
+                                                                        const stereo_recording_options& options = {});
 
 }  // namespace orbis::io
 

@@ -23,6 +23,7 @@
 #include <orbis/camera/stereo_frame.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/image.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/trajectory.hpp>
@@ -61,7 +62,7 @@ class synthetic_recording {
 
   /// @pre frames >= 0, fps > 0, width and height > 0, depth_scale > 0, light > 0, and the preconditions of the scene
   /// and the path
-  explicit synthetic_recording(const synthetic_options& options = {});
+  ORBIS_LAZY explicit synthetic_recording(const synthetic_options& options = {});
 
   [[nodiscard]] std::size_t size() const noexcept { return static_cast<std::size_t>(options_.frames); }
   [[nodiscard]] bool empty() const noexcept { return size() == 0; }
@@ -71,7 +72,7 @@ class synthetic_recording {
   /// The unsigned distance (metres) from a point in the world frame to the nearest surface visible to a camera: the
   /// error of a map point. Exact in front of the surfaces; behind them, where solids overlap, it is the distance to the
   /// surface of the solid in which the point is deepest. Ignores moving solids. O(number of solids)
-  [[nodiscard]] double surface_distance(const vec3& p_world) const noexcept;
+  ORBIS_LAZY [[nodiscard]] double surface_distance(const vec3& p_world) const noexcept;
   /// The room's solids, for tests of this component (io/detail/synthetic/scene.hpp).
   [[nodiscard]] const detail::synthetic::scene& scene() const noexcept;
   /// A pinhole camera with a focal length of 525 pixels at a width of 640 pixels.
@@ -89,12 +90,12 @@ class synthetic_recording {
     return both;
   }
   /// The exact pose of frame `i`.
-  [[nodiscard]] se3 T_world_camera(std::size_t i) const;
+  ORBIS_LAZY [[nodiscard]] se3 T_world_camera(std::size_t i) const;
   /// The exact poses of all frames.
-  [[nodiscard]] trajectory ground_truth() const;
+  ORBIS_LAZY [[nodiscard]] trajectory ground_truth() const;
 
   /// Frame `i` as measured by the sensor. Errors: invalid_argument if there is no frame `i`.
-  [[nodiscard]] result<camera::rgbd_frame> frame(std::size_t i) const;
+  ORBIS_LAZY [[nodiscard]] result<camera::rgbd_frame> frame(std::size_t i) const;
 
   /// Frame `i` as measured by the sensor, rendered on the policy's threads. Errors: those of `frame`.
   template <execution_policy Policy>
@@ -104,7 +105,7 @@ class synthetic_recording {
 
   /// Frame `i` of a stereo camera, whose left camera is `camera()` and whose right camera is displaced by
   /// `stereo_camera().baseline` to the right. Errors: those of `frame`.
-  [[nodiscard]] result<camera::stereo_frame> stereo_frame(std::size_t i) const;
+  ORBIS_LAZY [[nodiscard]] result<camera::stereo_frame> stereo_frame(std::size_t i) const;
   template <execution_policy Policy>
   [[nodiscard]] result<camera::stereo_frame> render_stereo(const Policy& policy, std::size_t i) const {
     return render_stereo_on(detail::synthetic::as_parallel(policy), i);
@@ -132,15 +133,17 @@ class synthetic_recording {
   }
 
   /// Iterates over the frames; each one is rendered when the iterator reaches it.
-  [[nodiscard]] iterator begin() const;
-  [[nodiscard]] iterator end() const;
+  ORBIS_LAZY [[nodiscard]] iterator begin() const;
+  ORBIS_LAZY [[nodiscard]] iterator end() const;
 
  private:
-  [[nodiscard]] result<camera::rgbd_frame> render_on(const parallel_policy& policy, std::size_t i) const;
-  [[nodiscard]] result<camera::stereo_frame> render_stereo_on(const parallel_policy& policy, std::size_t i) const;
-  [[nodiscard]] result<detail::synthetic::exact_view> exact_on(const parallel_policy& policy, std::size_t i) const;
+  ORBIS_LAZY [[nodiscard]] result<camera::rgbd_frame> render_on(const parallel_policy& policy, std::size_t i) const;
+  ORBIS_LAZY [[nodiscard]] result<camera::stereo_frame> render_stereo_on(const parallel_policy& policy,
+                                                                         std::size_t i) const;
+  ORBIS_LAZY [[nodiscard]] result<detail::synthetic::exact_view> exact_on(const parallel_policy& policy,
+                                                                          std::size_t i) const;
   /// Distance from a point along a ray to the nearest surface, in multiples of the ray's length; 0 if there is none.
-  [[nodiscard]] double depth_along(const vec3& origin, const vec3& ray) const;
+  ORBIS_LAZY [[nodiscard]] double depth_along(const vec3& origin, const vec3& ray) const;
 
   synthetic_options options_;
   camera::intrinsics k_;
@@ -158,28 +161,27 @@ class synthetic_recording::iterator {
   using pointer = const camera::rgbd_frame*;
 
   iterator() = default;
-  iterator(const synthetic_recording& recording, std::size_t index) : recording_{&recording}, index_{index} { load(); }
+  ORBIS_LAZY iterator(const synthetic_recording& recording, std::size_t index) : recording_{&recording}, index_{index} {
+    load();
+  }
 
   [[nodiscard]] reference operator*() const noexcept { return *frame_; }
   [[nodiscard]] pointer operator->() const noexcept { return frame_.get(); }
-  iterator& operator++() {
+  ORBIS_LAZY iterator& operator++() {
     ++index_;
     load();
     return *this;
   }
-  void operator++(int) { ++*this; }
+  ORBIS_LAZY void operator++(int) { ++*this; }
   [[nodiscard]] friend bool operator==(const iterator& a, const iterator& b) noexcept { return a.index_ == b.index_; }
 
  private:
-  void load();
+  ORBIS_LAZY void load();
 
   const synthetic_recording* recording_ = nullptr;
   std::size_t index_ = 0;
   std::shared_ptr<const camera::rgbd_frame> frame_;
 };
-
-inline synthetic_recording::iterator synthetic_recording::begin() const { return {*this, 0}; }
-inline synthetic_recording::iterator synthetic_recording::end() const { return {*this, size()}; }
 
 }  // namespace orbis::io
 

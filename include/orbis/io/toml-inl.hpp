@@ -17,7 +17,8 @@ namespace orbis::io {
 namespace detail {
 
 /// Returns true if each line that begins like a table header contains a key, as toml++ 3.3 assumes.
-[[nodiscard]] inline bool has_keys_in_heads(std::string_view text) noexcept {
+template <class = void>
+[[nodiscard]] bool has_keys_in_heads(std::string_view text) noexcept {
   const auto skip_blanks = [](std::string_view& line) {
     line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
   };
@@ -52,7 +53,8 @@ namespace detail {
 /// The reason why toml++ 3.3 would mishandle the text; null if there is none. Outside strings and comments, TOML
 /// requires ASCII, but toml++ treats some non-ASCII characters as blanks. Its behaviour is undefined for a date with
 /// "T" and no time, a list closed by "}", and some non-ASCII characters in strings or after a quotation mark in a word.
-[[nodiscard]] inline const char* find_mishandled(std::string_view text) {
+template <class = void>
+[[nodiscard]] const char* find_mishandled(std::string_view text) {
   static constexpr std::string_view date = "dddd-dd-dd";
   const auto is_date = [](std::string_view word) {
     return std::equal(word.begin(), word.end(), date.begin(), date.end(),
@@ -106,7 +108,7 @@ namespace detail {
 
 }  // namespace detail
 
-ORBIS_INLINE result<toml::table> parse_toml(std::string_view text, const std::filesystem::path& where) {
+ORBIS_LAZY_INLINE result<toml::table> parse_toml(std::string_view text, const std::filesystem::path& where) {
   const auto reject = [&](const char* why) { return fail(errc::malformed, where.string(), why); };
   if (text.size() > max_toml_bytes) return reject("is too large for a settings file");
   if (!is_utf8(text)) return reject("not TOML: not UTF-8");
@@ -121,7 +123,7 @@ ORBIS_INLINE result<toml::table> parse_toml(std::string_view text, const std::fi
   }
 }
 
-ORBIS_INLINE result<toml::table> read_toml(const std::filesystem::path& path) {
+ORBIS_LAZY_INLINE result<toml::table> read_toml(const std::filesystem::path& path) {
   const auto text = read_file(path, max_toml_bytes);
   if (!text) return fail(text.error());
   return parse_toml(*text, path);

@@ -10,6 +10,7 @@
 
 #include <toml++/toml.h>
 
+#include <orbis/core/inline.hpp>
 #include <orbis/core/result.hpp>
 
 namespace orbis::io {
@@ -23,10 +24,10 @@ inline constexpr std::size_t max_toml_bytes = 16384;
 /// Because of defects in toml++, two forms of valid TOML are rejected, too: keys with quotes after a dot in inline
 /// tables (`x = {a."b" = 1}`), and bare keys that contain a date followed by "T" or a blank, but no time
 /// (`2024-01-01Tx = 1`, `2024-01-01 = 1`).
-[[nodiscard]] result<toml::table> parse_toml(std::string_view text, const std::filesystem::path& where = {});
+ORBIS_LAZY [[nodiscard]] result<toml::table> parse_toml(std::string_view text, const std::filesystem::path& where = {});
 
 /// Reads a settings file; see `parse_toml`. Errors: not_found, unreadable, malformed.
-[[nodiscard]] result<toml::table> read_toml(const std::filesystem::path& path);
+ORBIS_LAZY [[nodiscard]] result<toml::table> read_toml(const std::filesystem::path& path);
 
 }  // namespace orbis::io
 

@@ -22,7 +22,7 @@
 
 namespace orbis::io {
 
-ORBIS_INLINE result<trajectory> parse_trajectory(std::string_view text, const std::filesystem::path& where) {
+ORBIS_LAZY_INLINE result<trajectory> parse_trajectory(std::string_view text, const std::filesystem::path& where) {
   trajectory poses;
   std::string problem;
   std::size_t problem_line = 0;
@@ -43,14 +43,14 @@ ORBIS_INLINE result<trajectory> parse_trajectory(std::string_view text, const st
   return poses;
 }
 
-ORBIS_INLINE result<trajectory> read_trajectory(const std::filesystem::path& path) {
+ORBIS_LAZY_INLINE result<trajectory> read_trajectory(const std::filesystem::path& path) {
   const auto text = read_file(path);
   if (!text) return fail(text.error());
   return parse_trajectory(*text, path);
 }
 
-ORBIS_INLINE result<trajectory_reading> parse_trajectory_file(std::string_view text,
-                                                              const std::filesystem::path& where) {
+ORBIS_LAZY_INLINE result<trajectory_reading> parse_trajectory_file(std::string_view text,
+                                                                   const std::filesystem::path& where) {
   auto lines = detail::parse_pose_lines(text, where);
   if (!lines) return fail(lines.error());
   const auto unit = lines->unit;
@@ -66,13 +66,13 @@ ORBIS_INLINE result<trajectory_reading> parse_trajectory_file(std::string_view t
   return read;
 }
 
-ORBIS_INLINE result<trajectory_reading> read_trajectory_file(const std::filesystem::path& path) {
+ORBIS_LAZY_INLINE result<trajectory_reading> read_trajectory_file(const std::filesystem::path& path) {
   const auto text = read_file(path);
   if (!text) return fail(text.error());
   return parse_trajectory_file(*text, path);
 }
 
-ORBIS_INLINE result<void> set_times(trajectory_reading& read, const std::filesystem::path& times) {
+ORBIS_LAZY_INLINE result<void> set_times(trajectory_reading& read, const std::filesystem::path& times) {
   const auto text = read_file(times);
   if (!text) return fail(text.error());
   const auto all = detail::parse_times(*text, times);
@@ -85,7 +85,7 @@ ORBIS_INLINE result<void> set_times(trajectory_reading& read, const std::filesys
   return {};
 }
 
-ORBIS_INLINE std::string describe_spans(const trajectory& a, const trajectory& b) {
+ORBIS_LAZY_INLINE std::string describe_spans(const trajectory& a, const trajectory& b) {
   const auto span = [](const trajectory& poses) {
     return poses.empty()
                ? std::string{"no time"}
@@ -95,7 +95,7 @@ ORBIS_INLINE std::string describe_spans(const trajectory& a, const trajectory& b
   return span(a) + " and " + span(b) + (units.empty() ? "" : "; " + units);
 }
 
-ORBIS_INLINE std::string describe_units(const trajectory& a, const trajectory& b) {
+ORBIS_LAZY_INLINE std::string describe_units(const trajectory& a, const trajectory& b) {
   constexpr double likely = 0.1;
   if (a.empty() || b.empty()) return {};
   // Intersection over union of the spans, with the times of `x` in another unit.
@@ -112,7 +112,7 @@ ORBIS_INLINE std::string describe_units(const trajectory& a, const trajectory& b
   return {};
 }
 
-ORBIS_INLINE result<void> write_trajectory(const std::filesystem::path& path, const trajectory& poses) {
+ORBIS_LAZY_INLINE result<void> write_trajectory(const std::filesystem::path& path, const trajectory& poses) {
   std::string text = "# timestamp tx ty tz qx qy qz qw\n";
   const auto add = [&](double value, std::chars_format format, int precision) {
     char buffer[400];  // the largest double has 309 digits before the point

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include <orbis/core/inline.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
 #include <orbis/io/trajectory_reading.hpp>
@@ -17,10 +18,11 @@ namespace orbis::io {
 /// The poses in `text`, stably sorted by time. `where` names the source in errors; quaternions of any positive norm are
 /// normalised. Text without poses gives an empty trajectory. Errors: malformed, with the line number (not 8 numbers,
 /// NaN or infinity, a zero quaternion).
-[[nodiscard]] result<trajectory> parse_trajectory(std::string_view text, const std::filesystem::path& where = {});
+ORBIS_LAZY [[nodiscard]] result<trajectory> parse_trajectory(std::string_view text,
+                                                             const std::filesystem::path& where = {});
 
 /// Reads a trajectory file; see `parse_trajectory`. Errors: not_found, unreadable, malformed.
-[[nodiscard]] result<trajectory> read_trajectory(const std::filesystem::path& path);
+ORBIS_LAZY [[nodiscard]] result<trajectory> read_trajectory(const std::filesystem::path& path);
 
 /// Parses a trajectory; its first lines determine the layout: EuRoC (the header lists the quaternion with w first, or
 /// lists no quaternion while fields are separated by commas and times have 19 digits), KITTI (12 numbers) or TUM.
@@ -34,28 +36,28 @@ namespace orbis::io {
 /// almost zero); unsupported (a header that lists the quaternion before the position, or in another order); degenerate
 /// (at least a quarter of the poses have the time of another pose and differ from it; with several runs, at least a
 /// quarter of the poses of the first run or more than half of all poses). O(n log n).
-[[nodiscard]] result<trajectory_reading> parse_trajectory_file(std::string_view text,
-                                                               const std::filesystem::path& where = {});
+ORBIS_LAZY [[nodiscard]] result<trajectory_reading> parse_trajectory_file(std::string_view text,
+                                                                          const std::filesystem::path& where = {});
 
 /// Reads a trajectory file; see `parse_trajectory_file`. Errors: not_found, unreadable, malformed, unsupported,
 /// degenerate.
-[[nodiscard]] result<trajectory_reading> read_trajectory_file(const std::filesystem::path& path);
+ORBIS_LAZY [[nodiscard]] result<trajectory_reading> read_trajectory_file(const std::filesystem::path& path);
 
 /// Sets the times of a trajectory in KITTI's layout from a file with ascending times, one per line. Errors: not_found,
 /// unreadable, malformed (an invalid line, with its number, or different numbers of times and poses).
-[[nodiscard]] result<void> set_times(trajectory_reading& read, const std::filesystem::path& times);
+ORBIS_LAZY [[nodiscard]] result<void> set_times(trajectory_reading& read, const std::filesystem::path& times);
 
 /// Time spans of two trajectories for a message: "1403715529 to 1403715531.5 s and 0 to 2 s", followed by the result of
 /// `describe_units`.
-[[nodiscard]] std::string describe_spans(const trajectory& a, const trajectory& b);
+ORBIS_LAZY [[nodiscard]] std::string describe_spans(const trajectory& a, const trajectory& b);
 
 /// An explanation for two trajectories whose time spans agree only if the times of one are in another unit: "the times
 /// of the first seem to be in milliseconds". Empty for all other trajectories.
-[[nodiscard]] std::string describe_units(const trajectory& a, const trajectory& b);
+ORBIS_LAZY [[nodiscard]] std::string describe_units(const trajectory& a, const trajectory& b);
 
 /// Writes a trajectory file atomically: 9 decimals for the time, 9 significant digits for the rest. Errors:
 /// write_failed.
-result<void> write_trajectory(const std::filesystem::path& path, const trajectory& poses);
+ORBIS_LAZY result<void> write_trajectory(const std::filesystem::path& path, const trajectory& poses);
 
 }  // namespace orbis::io
 

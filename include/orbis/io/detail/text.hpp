@@ -16,7 +16,8 @@
 namespace orbis::io::detail {
 
 /// Returns "path:line", for the `where` of an error.
-[[nodiscard]] inline std::string at_line(const std::filesystem::path& path, std::size_t line) {
+template <class = void>
+[[nodiscard]] std::string at_line(const std::filesystem::path& path, std::size_t line) {
   return path.string() + ":" + std::to_string(line);
 }
 
@@ -27,7 +28,8 @@ namespace orbis::io::detail {
   return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
 }
 
-[[nodiscard]] inline std::string lower_cased(std::string text) {
+template <class = void>
+[[nodiscard]] std::string lower_cased(std::string text) {
   for (char& c : text) c = lower_case(c);
   return text;
 }

@@ -47,15 +47,17 @@ inline constexpr time_unit time_units[] = {
 
 /// Parses a time stamp in `unit`, by default the unit that `detect_unit` returns. Returns seconds; empty if the time
 /// stamp is not a finite number.
-[[nodiscard]] inline std::optional<double> parse_time_stamp(std::string_view stamp,
-                                                            std::optional<time_unit> unit = {}) noexcept {
+template <class = void>
+[[nodiscard]] std::optional<double> parse_time_stamp(std::string_view stamp,
+                                                     std::optional<time_unit> unit = {}) noexcept {
   double t = 0.0;
   if (!parse_number(stamp, t) || !std::isfinite(t)) return std::nullopt;
   return t * unit.value_or(detect_unit(stamp)).seconds;
 }
 
 /// Formats a time in seconds for messages, with at most 6 decimals.
-[[nodiscard]] inline std::string describe(double seconds) {
+template <class = void>
+[[nodiscard]] std::string describe(double seconds) {
   char text[400];  // the largest double has 309 digits
   const int length = std::snprintf(text, sizeof text, "%.6f", seconds);
   std::string all(text, static_cast<std::size_t>(length));
@@ -65,13 +67,15 @@ inline constexpr time_unit time_units[] = {
 }
 
 /// Formats the span of times for a message: "12.5 to 20". @pre !times.empty()
-[[nodiscard]] inline std::string describe_span(const std::vector<double>& times) {
+template <class = void>
+[[nodiscard]] std::string describe_span(const std::vector<double>& times) {
   const auto [first, last] = std::minmax_element(times.begin(), times.end());
   return describe(*first) + " to " + describe(*last);
 }
 
 /// The median difference between consecutive times. @pre times ascend, times.size() >= 2
-[[nodiscard]] inline double median_interval(const std::vector<double>& times) {
+template <class = void>
+[[nodiscard]] double median_interval(const std::vector<double>& times) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < times.size(); ++i) steps.push_back(times[i] - times[i - 1]);
   const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
@@ -79,13 +83,15 @@ inline constexpr time_unit time_units[] = {
   return *middle;
 }
 
-[[nodiscard]] inline bool are_whole(const std::vector<double>& times) {
+template <class = void>
+[[nodiscard]] bool are_whole(const std::vector<double>& times) {
   return std::all_of(times.begin(), times.end(), [](double t) { return t == std::floor(t); });
 }
 
 /// Returns true if ascending times are frame numbers: whole numbers, mostly less than ten apart, and far smaller than
 /// seconds since 1970.
-[[nodiscard]] inline bool are_frame_numbers(const std::vector<double>& times) {
+template <class = void>
+[[nodiscard]] bool are_frame_numbers(const std::vector<double>& times) {
   constexpr double most_apart = 10.0, highest = 1e8;
   return times.size() >= 2 && times.front() >= 0.0 && times.back() < highest && are_whole(times) &&
          median_interval(times) < most_apart;
@@ -93,7 +99,8 @@ inline constexpr time_unit time_units[] = {
 
 /// A warning if the median interval of ascending times is more than 30 times longer or shorter than that of a camera
 /// with `fps` frames per second; empty otherwise. The warning states the factor by which the times seem to be wrong.
-[[nodiscard]] inline std::string describe_interval(const std::vector<double>& times, double fps) {
+template <class = void>
+[[nodiscard]] std::string describe_interval(const std::vector<double>& times, double fps) {
   constexpr double tolerance = 30.0;
   if (times.size() < 3) return {};
   const double interval = median_interval(times), ratio = interval * fps;

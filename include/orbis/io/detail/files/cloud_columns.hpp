@@ -47,30 +47,38 @@ constexpr std::array<std::string_view, 3> color_names[] = {
 constexpr std::string_view packed_color_names[] = {"rgb", "rgba"};
 
 /// Returns true if `name`, in any case, is equal to `known`, a name in lower case.
-[[nodiscard]] inline bool is_name(std::string_view name, std::string_view known) {
+template <class = void>
+[[nodiscard]] bool is_name(std::string_view name, std::string_view known) {
   return std::ranges::equal(name, known, {}, lower_case);
 }
-[[nodiscard]] inline bool is_one_of(std::string_view name, std::span<const std::string_view> known) {
+template <class = void>
+[[nodiscard]] bool is_one_of(std::string_view name, std::span<const std::string_view> known) {
   return std::ranges::any_of(known, [&](std::string_view k) { return is_name(name, k); });
 }
-[[nodiscard]] inline bool is_coordinate(std::string_view name) { return is_one_of(name, coordinate_names); }
+template <class = void>
+[[nodiscard]] bool is_coordinate(std::string_view name) {
+  return is_one_of(name, coordinate_names);
+}
 
 /// Returns true if points or colours may be read from columns with this name.
-[[nodiscard]] inline bool is_point_or_color(std::string_view name) {
+template <class = void>
+[[nodiscard]] bool is_point_or_color(std::string_view name) {
   return is_coordinate(name) || is_one_of(name, packed_color_names) ||
          std::ranges::any_of(color_names, [&](const auto& names) { return is_one_of(name, names); });
 }
 
 /// A column of zeros for `points` points. Coordinates from text are stored as double, regardless of the declared type.
-[[nodiscard]] inline cloud_field make_column(std::string name, scalar_type type, std::size_t count, std::size_t points,
-                                             bool text) {
+template <class = void>
+[[nodiscard]] cloud_field make_column(std::string name, scalar_type type, std::size_t count, std::size_t points,
+                                      bool text) {
   if (text && is_coordinate(name)) type = scalar_type::float64;
   return {std::move(name), type, count, std::string(points * count * byte_size(type), '\0')};
 }
 
 /// Stores the number `token` at `index` in the column. If the column's type cannot represent it (such as an integer of
 /// more than 24 bits in a float), the column is converted to float64. Returns false if `token` is not a number.
-[[nodiscard]] inline bool store_number(cloud_field& column, std::size_t index, std::string_view token) {
+template <class = void>
+[[nodiscard]] bool store_number(cloud_field& column, std::size_t index, std::string_view token) {
   const auto store = [&](auto value) {
     if (!parse_number(token, value)) return false;
     if constexpr (std::is_same_v<decltype(value), float>)
@@ -92,20 +100,24 @@ constexpr std::string_view packed_color_names[] = {"rgb", "rgba"};
   return store(value);
 }
 
-[[nodiscard]] inline double number_at(const cloud_field& column, std::size_t index) {
+template <class = void>
+[[nodiscard]] double number_at(const cloud_field& column, std::size_t index) {
   return load_as_double(column.bytes.data() + index * byte_size(column.type), column.type, std::endian::little);
 }
 
-inline rgb8 unpacked_rgb(std::uint32_t packed) {
+template <class = void>
+rgb8 unpacked_rgb(std::uint32_t packed) {
   return {static_cast<std::uint8_t>(packed >> 16), static_cast<std::uint8_t>(packed >> 8),
           static_cast<std::uint8_t>(packed)};
 }
-inline std::uint32_t packed_rgb(const rgb8& c) {
+template <class = void>
+std::uint32_t packed_rgb(const rgb8& c) {
   return static_cast<std::uint32_t>(c.r) << 16 | static_cast<std::uint32_t>(c.g) << 8 | c.b;
 }
 
 /// Formats a number for a message, with at most six digits.
-inline std::string shortened(double value) {
+template <class = void>
+std::string shortened(double value) {
   char text[32];
   const auto [end, failure] = std::to_chars(text, text + sizeof text, value, std::chars_format::general, 6);
   return {text, end};
@@ -115,8 +127,9 @@ inline std::string shortened(double value) {
 /// all channels of the same kind (8-bit, wider integer, floating point). For floating-point values up to 2 the range is
 /// 0 to 1, because rounding, interpolation and lighting may raise them above 1. For other values it is the smallest
 /// range of 8, 12 or 16 bits that contains them. Notes report a range that differs from that of the type.
-inline std::vector<rgb8> channel_colors(const std::array<const cloud_field*, 3>& channels, std::size_t size,
-                                        std::vector<std::string>& notes) {
+template <class = void>
+std::vector<rgb8> channel_colors(const std::array<const cloud_field*, 3>& channels, std::size_t size,
+                                 std::vector<std::string>& notes) {
   const auto is_byte = [](scalar_type type) { return byte_size(type) == 1; };
   double most_integer = 0.0, most_floating = 0.0;
   for (const cloud_field* c : channels)
@@ -151,8 +164,9 @@ inline std::vector<rgb8> channel_colors(const std::array<const cloud_field*, 3>&
 /// Colours packed as 0xAARRGGBB into integers or the bits of floats; empty if the column contains other numbers. In
 /// text files, whole numbers in a float column are treated as integers, because their bits as floats would give colours
 /// with an unusual alpha. `alpha` receives the most significant bytes.
-inline std::optional<std::vector<rgb8>> packed_colors(const cloud_field& column, std::size_t size, bool is_text,
-                                                      std::string& alpha, std::vector<std::string>& notes) {
+template <class = void>
+std::optional<std::vector<rgb8>> packed_colors(const cloud_field& column, std::size_t size, bool is_text,
+                                               std::string& alpha, std::vector<std::string>& notes) {
   std::vector<rgb8> colors(size);
   alpha.resize(size);
   bool are_integers = true, are_zero = true;
@@ -176,7 +190,8 @@ inline std::optional<std::vector<rgb8>> packed_colors(const cloud_field& column,
 
 /// Interprets columns as points, colours and other fields. `origin` is subtracted from the coordinates before they are
 /// converted to float. Errors: unsupported (no x, y and z).
-inline result<cloud_with_fields> to_cloud(cloud_columns&& read, const std::string& where, const vec3& origin) {
+template <class = void>
+result<cloud_with_fields> to_cloud(cloud_columns&& read, const std::string& where, const vec3& origin) {
   cloud_with_fields out;
   out.viewpoint = read.viewpoint;
   out.notes = std::move(read.notes);

@@ -21,7 +21,8 @@ namespace orbis::io::detail {
 [[nodiscard]] constexpr std::uint64_t lzf_max_output(std::uint64_t size) noexcept { return size * 88 + 32; }
 
 /// Decompresses exactly `size` bytes; empty if `compressed` is damaged or expands to another size.
-[[nodiscard]] inline std::optional<std::string> lzf_decompress(std::string_view compressed, std::size_t size) {
+template <class = void>
+[[nodiscard]] std::optional<std::string> lzf_decompress(std::string_view compressed, std::size_t size) {
   if (size > lzf_max_output(compressed.size())) return std::nullopt;
   std::string out;
   out.reserve(size);
@@ -50,7 +51,8 @@ namespace orbis::io::detail {
 
 /// Compresses `data` greedily, with one stored position for each hash of three bytes. Incompressible data grows by one
 /// byte per 32.
-[[nodiscard]] inline std::string lzf_compress(std::string_view data) {
+template <class = void>
+[[nodiscard]] std::string lzf_compress(std::string_view data) {
   constexpr std::size_t max_distance = 8192, max_length = 264, none = static_cast<std::size_t>(-1);
   constexpr unsigned hash_bits = 14;
   std::array<std::size_t, std::size_t{1} << hash_bits> last{};

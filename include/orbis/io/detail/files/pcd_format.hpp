@@ -58,7 +58,8 @@ struct pcd_header {
 
 /// Parses seven numbers, and describes a viewpoint other than the identity in `header.note`. A zero quaternion counts
 /// as the identity.
-inline void parse_viewpoint(std::string_view line, pcd_header& header) {
+template <class = void>
+void parse_viewpoint(std::string_view line, pcd_header& header) {
   const std::string text{trimmed(line)};
   std::array<double, 7> read{};
   for (double& v : read)
@@ -79,7 +80,8 @@ inline void parse_viewpoint(std::string_view line, pcd_header& header) {
 }
 
 /// Parses the header and removes it from the front of `bytes`.
-inline result<pcd_header> take_pcd_header(std::string_view& bytes, const std::string& where) {
+template <class = void>
+result<pcd_header> take_pcd_header(std::string_view& bytes, const std::string& where) {
   constexpr std::size_t max_point_size = 1 << 16;
   pcd_header header;
   bool has_width = false, has_points = false, has_data = false;
@@ -154,8 +156,8 @@ inline result<pcd_header> take_pcd_header(std::string_view& bytes, const std::st
 }
 
 /// The columns of the points: all, or only coordinates and colours. `column_of[k]`: index of the column of field k.
-inline cloud_columns make_columns(const pcd_header& header, bool all,
-                                  std::vector<std::optional<std::size_t>>& column_of) {
+template <class = void>
+cloud_columns make_columns(const pcd_header& header, bool all, std::vector<std::optional<std::size_t>>& column_of) {
   cloud_columns read{.columns = {},
                      .size = static_cast<std::size_t>(header.points),
                      .viewpoint = header.viewpoint,
@@ -174,8 +176,9 @@ inline cloud_columns make_columns(const pcd_header& header, bool all,
 }
 
 /// Reads points from lines of text. Errors: malformed, with the line number.
-inline result<cloud_columns> read_pcd_text(std::string_view body, const pcd_header& header, bool all,
-                                           const std::string& where) {
+template <class = void>
+result<cloud_columns> read_pcd_text(std::string_view body, const pcd_header& header, bool all,
+                                    const std::string& where) {
   if (header.points > (body.size() + 1) / (2 * header.tokens))  // one digit per number, plus separators
     return fail(errc::malformed, where,
                 "the data ends early: it is too short for " + std::to_string(header.points) + " points");
@@ -224,7 +227,8 @@ cloud_columns read_pcd_binary(const pcd_header& header, bool all, At&& at) {
 }
 
 /// Reads the points of a PCD file: all columns, or only coordinates and colours. Errors: malformed.
-inline result<cloud_columns> read_pcd_columns(std::string_view bytes, const std::string& where, bool all) {
+template <class = void>
+result<cloud_columns> read_pcd_columns(std::string_view bytes, const std::string& where, bool all) {
   const auto header = take_pcd_header(bytes, where);
   if (!header) return fail(header.error());
   if (header->point_size == 0) return fail(errc::unsupported, where, "the points lack x, y or z");

@@ -38,7 +38,8 @@ struct ply_header {
   std::vector<ply_element> elements;
 };
 
-inline std::optional<scalar_type> ply_type(std::string_view name) {
+template <class = void>
+std::optional<scalar_type> ply_type(std::string_view name) {
   using enum scalar_type;
   constexpr std::pair<std::string_view, scalar_type> names[] = {
       {"char", int8},     {"int8", int8},       {"uchar", uint8},    {"uint8", uint8},
@@ -58,7 +59,8 @@ constexpr std::string_view ply_name(scalar_type type) {
 }
 
 /// Parses the header and removes it from the front of `bytes`.
-inline result<ply_header> take_ply_header(std::string_view& bytes, const std::string& where) {
+template <class = void>
+result<ply_header> take_ply_header(std::string_view& bytes, const std::string& where) {
   ply_header header;
   const auto bad = [&](std::string why) { return fail(errc::malformed, where, "PLY header: " + std::move(why)); };
   if (bytes.empty() || trimmed(next_line(bytes)) != "ply") return fail(errc::malformed, where, "is not a PLY file");
@@ -155,7 +157,8 @@ class ply_body {
 };
 
 /// Reads the vertices of a PLY file: all columns, or only coordinates and colours. Errors: malformed, unsupported.
-inline result<cloud_columns> read_ply_columns(std::string_view bytes, const std::string& where, bool all) {
+template <class = void>
+result<cloud_columns> read_ply_columns(std::string_view bytes, const std::string& where, bool all) {
   const auto header = take_ply_header(bytes, where);
   if (!header) return fail(header.error());
   const bool text = header->format == ply_format::ascii;

@@ -120,7 +120,8 @@ class png_decoder {
   int bits_ = 0, color_type_ = 0;
 };
 
-inline tl::unexpected<error> damaged_png(const std::string& where, const png_decoder& decoder) {
+template <class = void>
+tl::unexpected<error> damaged_png(const std::string& where, const png_decoder& decoder) {
   return fail(errc::malformed, where, "damaged PNG: " + decoder.message());
 }
 

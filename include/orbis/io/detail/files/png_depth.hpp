@@ -33,7 +33,8 @@ struct packed_depth {
 };
 
 /// Reads the chunks of such a PNG file; empty for any other file and for a damaged one. O(bytes).
-[[nodiscard]] inline std::optional<packed_depth> read_depth_chunks(std::string_view bytes) {
+template <class = void>
+[[nodiscard]] std::optional<packed_depth> read_depth_chunks(std::string_view bytes) {
   using namespace std::string_view_literals;
   const auto number = [](std::string_view at) { return load_number<std::uint32_t>(at.data(), std::endian::big); };
   if (!bytes.starts_with("\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR"sv)) return std::nullopt;
@@ -61,8 +62,9 @@ struct packed_depth {
 }
 
 /// Reverses the filter of a row of 16-bit pixels, given the row above.
-[[nodiscard]] inline bool unfilter_depth_row(unsigned filter, unsigned char* row, const unsigned char* above,
-                                             std::size_t width) {
+template <class = void>
+[[nodiscard]] bool unfilter_depth_row(unsigned filter, unsigned char* row, const unsigned char* above,
+                                      std::size_t width) {
   const auto each = [&](const auto& predict) {  // predicts from the bytes to the left, above, and above left
     for (std::size_t byte = 0; byte != 2; ++byte)
       for (std::size_t i = byte, before = 0, corner = 0; i < 2 * width; i += 2) {
@@ -93,7 +95,8 @@ struct packed_depth {
 /// Decodes a non-interlaced 16-bit grey PNG file in half the time of libpng. Empty for all other files and damaged
 /// files, which libpng decodes or reports. Allocates a copy of the compressed pixels, the decompressed bytes (at most
 /// 1032 times the compressed size), and the image, which is smaller than the decompressed bytes.
-[[nodiscard]] inline std::optional<image<std::uint16_t>> decode_plain_depth(std::string_view bytes) {
+template <class = void>
+[[nodiscard]] std::optional<image<std::uint16_t>> decode_plain_depth(std::string_view bytes) {
   const auto packed = read_depth_chunks(bytes);
   if (!packed) return std::nullopt;
   const std::uint64_t row_bytes = 2 * std::uint64_t{packed->width} + 1, raw_bytes = row_bytes * packed->height;

@@ -19,14 +19,16 @@ namespace orbis::io::detail {
 /// Removes the next field from the front of a line and returns it. Fields end at commas if the line contains one,
 /// otherwise at semicolons if it contains one, otherwise at blanks. A separator at the end of the line does not start
 /// another field.
-[[nodiscard]] inline std::string_view next_value(std::string_view& line, char separator) {
+template <class = void>
+[[nodiscard]] std::string_view next_value(std::string_view& line, char separator) {
   if (separator == ' ') return next_field(line);
   const std::size_t end = std::min(line.find(separator), line.size());
   const std::string_view field = trimmed(line.substr(0, end));
   line.remove_prefix(std::min(end + 1, line.size()));
   return field;
 }
-[[nodiscard]] inline char find_separator(std::string_view line) {
+template <class = void>
+[[nodiscard]] char find_separator(std::string_view line) {
   return line.find(',') != line.npos ? ',' : line.find(';') != line.npos ? ';' : ' ';
 }
 
@@ -69,7 +71,8 @@ struct column_name {
 };
 /// The names of the columns in a line; empty if there are more than 200, because such a line is not a pose header and
 /// the names would take many times the memory of the line.
-[[nodiscard]] inline std::vector<column_name> column_names(std::string_view line, char separator) {
+template <class = void>
+[[nodiscard]] std::vector<column_name> column_names(std::string_view line, char separator) {
   std::vector<column_name> names;
   while (!line.empty()) {
     if (names.size() == 200) return {};
@@ -90,8 +93,8 @@ struct column_name {
 
 /// Returns true if the `letters.size()` names starting at index `first` each end in a different one of the letters, in
 /// any order, and are otherwise equal.
-[[nodiscard]] inline bool are_components(const std::vector<column_name>& names, std::size_t first,
-                                         std::string_view letters) {
+template <class = void>
+[[nodiscard]] bool are_components(const std::vector<column_name>& names, std::size_t first, std::string_view letters) {
   if (first + letters.size() > names.size()) return false;
   for (std::size_t i = first; i != first + letters.size(); ++i)
     if (names[i].text.empty() || names[i].prefix() != names[first].prefix()) return false;
@@ -105,7 +108,8 @@ struct column_name {
 /// Parses a header such as `#timestamp [ns], p_RS_R_x [m], ..., q_RS_w [], ...`. The quaternion consists of the first
 /// four consecutive columns whose names end in w, x, y and z and are otherwise equal. Other columns may precede it if
 /// the header lists the time and the position.
-[[nodiscard]] inline pose_header parse_pose_header(std::string_view line) {
+template <class = void>
+[[nodiscard]] pose_header parse_pose_header(std::string_view line) {
   pose_header header;
   header.is_comment = line.starts_with('#');
   while (!line.empty() && (line.front() == '#' || is_blank(line.front()))) line.remove_prefix(1);

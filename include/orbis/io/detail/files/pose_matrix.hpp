@@ -21,7 +21,8 @@ namespace orbis::io::detail {
 /// Parses the pose `T_world_camera` from a text with a 4x4 matrix. Its upper left part may deviate from a rotation by a
 /// few parts in a thousand, as in 7-Scenes: the result has the nearest rotation. Errors: malformed, with the line
 /// number (not 16 numbers, NaN or infinity, a matrix that deviates from a rigid transform by more than 5 %).
-[[nodiscard]] inline result<se3> parse_pose_matrix(std::string_view text, const std::filesystem::path& path) {
+template <class = void>
+[[nodiscard]] result<se3> parse_pose_matrix(std::string_view text, const std::filesystem::path& path) {
   double m[16];
   std::size_t count = 0, last_line = 0;
   std::string problem;
@@ -54,7 +55,8 @@ namespace orbis::io::detail {
 }
 
 /// Reads a pose; see `parse_pose_matrix`. Errors: not_found, unreadable, malformed.
-[[nodiscard]] inline result<se3> read_pose_matrix(const std::filesystem::path& path) {
+template <class = void>
+[[nodiscard]] result<se3> read_pose_matrix(const std::filesystem::path& path) {
   const auto text = read_file(path);
   if (!text) return fail(text.error());
   return parse_pose_matrix(*text, path);
@@ -62,7 +64,8 @@ namespace orbis::io::detail {
 
 /// Returns true if a number in the text is NaN or infinite, or if the text is a matrix (at least 3x4, row by row) whose
 /// rotation is zero: data sets mark the poses of lost frames in these ways.
-[[nodiscard]] inline bool is_lost_pose(std::string_view text) {
+template <class = void>
+[[nodiscard]] bool is_lost_pose(std::string_view text) {
   bool lost = false, is_zero = true;
   std::size_t count = 0;
   for_each_line(text, [&](std::string_view line, std::size_t) {
@@ -80,7 +83,8 @@ namespace orbis::io::detail {
 }
 
 /// A warning about frames without a pose.
-[[nodiscard]] inline std::string lost_frames_note(std::size_t lost, std::size_t frames) {
+template <class = void>
+[[nodiscard]] std::string lost_frames_note(std::size_t lost, std::size_t frames) {
   return std::to_string(lost) + " of " + std::to_string(frames) + " frames have no pose: tracking was lost";
 }
 

@@ -43,9 +43,10 @@ struct pose_lines {
 
 /// Parses a pose as numbers: time, position, quaternion in the order of the file. Returns an explanation if the line is
 /// not a pose; sets `lost` if a number is NaN or infinite.
-[[nodiscard]] inline std::string parse_pose_numbers(std::string_view line, char separator, bool more_columns,
-                                                    std::array<double, 8>& v, bool& lost,
-                                                    const pose_columns& columns = usual_columns) {
+template <class = void>
+[[nodiscard]] std::string parse_pose_numbers(std::string_view line, char separator, bool more_columns,
+                                             std::array<double, 8>& v, bool& lost,
+                                             const pose_columns& columns = usual_columns) {
   const char* const eight = more_columns ? "a pose must have a time, a position and a quaternion"
                                          : "a pose must have 8 numbers: timestamp tx ty tz qx qy qz qw";
   lost = false;
@@ -65,14 +66,16 @@ struct pose_lines {
 }
 
 /// Converts the numbers of a line to a pose; empty if the quaternion is zero or too large.
-[[nodiscard]] inline std::optional<se3> make_pose(const std::array<double, 8>& v, bool w_first) {
+template <class = void>
+[[nodiscard]] std::optional<se3> make_pose(const std::array<double, 8>& v, bool w_first) {
   const so3::quaternion q = w_first ? so3::quaternion(v[4], v[5], v[6], v[7]) : so3::quaternion(v[7], v[4], v[5], v[6]);
   if (!(q.norm() > 1e-6) || !std::isfinite(q.norm())) return std::nullopt;
   return se3(so3(q), vec3(v[1], v[2], v[3]));
 }
 
 /// Returns true if the line consists of column names: no field is a number, or the fields are 0, 1, 2, ...
-[[nodiscard]] inline bool has_names(std::string_view line) {
+template <class = void>
+[[nodiscard]] bool has_names(std::string_view line) {
   const char separator = find_separator(line);
   std::size_t numbers = 0, columns = 0;
   bool in_order = true;
@@ -89,8 +92,9 @@ struct pose_lines {
 /// otherwise TUM. `assumed`: the header to assume for a file without a header. Adds notes about a header line that
 /// cannot be interpreted and about columns other than the first eight. Errors: malformed, with the line number;
 /// unsupported (a header that lists the columns in another order).
-inline result<pose_lines> parse_pose_lines(std::string_view text, const std::filesystem::path& where,
-                                           pose_header assumed = {}) {
+template <class = void>
+result<pose_lines> parse_pose_lines(std::string_view text, const std::filesystem::path& where,
+                                    pose_header assumed = {}) {
   pose_lines read;
   pose_header header = assumed;
   std::string unknown_names;  // note about a line before the poses
@@ -177,7 +181,8 @@ inline result<pose_lines> parse_pose_lines(std::string_view text, const std::fil
 
 /// Indices of the entries at which time jumps back so far that another run begins there; empty if the lines are only
 /// out of order.
-[[nodiscard]] inline std::vector<std::size_t> starts_of_runs(const std::vector<pose_lines::entry>& entries) {
+template <class = void>
+[[nodiscard]] std::vector<std::size_t> starts_of_runs(const std::vector<pose_lines::entry>& entries) {
   constexpr std::size_t shortest = 3, most = 20;
   constexpr double jump = 10.0;  // median intervals
   std::vector<double> steps;
@@ -200,7 +205,8 @@ inline result<pose_lines> parse_pose_lines(std::string_view text, const std::fil
 }
 
 /// Returns true if two poses are bit-identical.
-[[nodiscard]] inline bool same_pose(const se3& a, const se3& b) {
+template <class = void>
+[[nodiscard]] bool same_pose(const se3& a, const se3& b) {
   return a.translation() == b.translation() &&
          a.rotation().unit_quaternion().coeffs() == b.rotation().unit_quaternion().coeffs();
 }
@@ -210,7 +216,8 @@ struct repeated_times {
   std::size_t same = 0;       ///< number of removed entries with the same pose as the kept one
   std::size_t different = 0;  ///< number of removed entries with a different pose
 };
-inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
+template <class = void>
+repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
   repeated_times removed;
   std::size_t kept = 0;
   for (std::size_t i = 0; i != entries.size(); ++i) {
@@ -227,7 +234,8 @@ inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
 
 /// Returns true if an entry from index `later` on has a time within the span of the entries before `later`, whose times
 /// ascend, and a pose that differs from all poses at that time.
-[[nodiscard]] inline bool contradicts(const std::vector<pose_lines::entry>& entries, std::size_t later) {
+template <class = void>
+[[nodiscard]] bool contradicts(const std::vector<pose_lines::entry>& entries, std::size_t later) {
   const auto begin = entries.begin(), end = begin + static_cast<std::ptrdiff_t>(later);
   const auto earlier = [](const auto& a, const auto& b) { return a.pose.timestamp < b.pose.timestamp; };
   return std::any_of(end, entries.end(), [&](const pose_lines::entry& e) {
@@ -241,7 +249,8 @@ inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
 
 /// Explains why different poses have equal times. `entries` have distinct, ascending times. Times have too few digits
 /// if they are multiples of 1, 0.1, ... seconds, and this unit is not much shorter than their median interval.
-[[nodiscard]] inline std::string explain_equal_times(const std::vector<pose_lines::entry>& entries) {
+template <class = void>
+[[nodiscard]] std::string explain_equal_times(const std::vector<pose_lines::entry>& entries) {
   std::vector<double> times;
   for (const pose_lines::entry& e : entries) times.push_back(e.pose.timestamp);
   const auto are_multiples = [&](double step) {
@@ -257,7 +266,8 @@ inline repeated_times keep_first(std::vector<pose_lines::entry>& entries) {
 
 /// Sorts the poses by time and keeps the first line for each time. If a later run contains other poses for times within
 /// the first run, only the first run is kept. Errors: degenerate (see `parse_trajectory_file`).
-[[nodiscard]] inline result<trajectory_reading> order_poses(pose_lines&& lines, const std::filesystem::path& where) {
+template <class = void>
+[[nodiscard]] result<trajectory_reading> order_poses(pose_lines&& lines, const std::filesystem::path& where) {
   trajectory_reading read{.poses = {}, .layout = lines.layout, .lost = lines.lost, .notes = {}};
   const auto note = [&](const std::string& text) { read.notes.push_back(where.string() + ": " + text); };
   for (const std::string& text : lines.notes) note(text);

@@ -41,7 +41,8 @@ constexpr decltype(auto) with_type(scalar_type type, F&& f) {
 }
 
 /// The number of type `type` stored at `from`.
-[[nodiscard]] inline double load_as_double(const char* from, scalar_type type, std::endian order) noexcept {
+template <class = void>
+[[nodiscard]] double load_as_double(const char* from, scalar_type type, std::endian order) noexcept {
   return with_type(type, [&](auto zero) { return static_cast<double>(load_number<decltype(zero)>(from, order)); });
 }
 

@@ -16,8 +16,8 @@ namespace orbis::io::detail {
 
 /// Parses time stamps (`parse_time_stamp`), one per line. Errors: malformed, with the line number (not a number, or not
 /// ascending).
-[[nodiscard]] inline result<std::vector<double>> parse_times(std::string_view text,
-                                                             const std::filesystem::path& where) {
+template <class = void>
+[[nodiscard]] result<std::vector<double>> parse_times(std::string_view text, const std::filesystem::path& where) {
   std::vector<double> times;
   std::size_t bad_line = 0;
   for_each_line(text, [&](std::string_view line, std::size_t number) {

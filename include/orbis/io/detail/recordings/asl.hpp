@@ -46,7 +46,8 @@ struct asl_camera {
 };
 
 /// Parses a camera's `sensor.yaml`. Errors: malformed (with file and line), unsupported (an unknown model).
-[[nodiscard]] inline result<asl_camera> parse_asl_camera(std::string_view text, const std::filesystem::path& where) {
+template <class = void>
+[[nodiscard]] result<asl_camera> parse_asl_camera(std::string_view text, const std::filesystem::path& where) {
   const auto yaml = plain_yaml::parse(text, where);
   if (!yaml) return fail(yaml.error());
   const auto reject = [&](std::string why) { return fail(errc::malformed, where.string(), std::move(why)); };
@@ -100,15 +101,16 @@ struct asl_camera {
 /// Parses the ground truth's `data.csv`: nanoseconds, position and quaternion (w first) of the body; further columns
 /// are ignored. Lost poses and repeated times are handled and noted as in `parse_trajectory_file`. Errors: malformed,
 /// with the line number; degenerate.
-[[nodiscard]] inline result<trajectory_reading> parse_asl_poses(std::string_view text,
-                                                                const std::filesystem::path& where) {
+template <class = void>
+[[nodiscard]] result<trajectory_reading> parse_asl_poses(std::string_view text, const std::filesystem::path& where) {
   auto lines = parse_pose_lines(text, where, {.quaternion = 4, .w_first = true, .nanoseconds = true});
   if (!lines) return fail(lines.error());
   return order_poses(*std::move(lines), where);
 }
 
 /// The folder that contains `cam0` and `cam1`; empty if there is none.
-[[nodiscard]] inline std::filesystem::path asl_root(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] std::filesystem::path asl_root(const std::filesystem::path& folder) {
   for (const auto& root : {folder / "mav0", folder})
     for (const char* const part : {"sensor.yaml", "data.csv", "data"})
       if (present(root / "cam0" / part)) return root;
@@ -116,7 +118,8 @@ struct asl_camera {
 }
 
 /// Returns true if `folder` looks like a recording in the ASL layout with two cameras.
-[[nodiscard]] inline bool is_asl(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] bool is_asl(const std::filesystem::path& folder) {
   const auto root = asl_root(folder);
   return !root.empty() && present(root / "cam1");
 }
@@ -129,7 +132,8 @@ struct asl_images {
 
 /// Reads `sensor.yaml` and `data.csv` from a camera's folder and adds both to `to.files`. Errors: not_found (a file),
 /// unreadable, no_data, malformed (with file and line), unsupported.
-[[nodiscard]] inline result<asl_images> read_asl_images(const std::filesystem::path& where, recording_index& to) {
+template <class = void>
+[[nodiscard]] result<asl_images> read_asl_images(const std::filesystem::path& where, recording_index& to) {
   std::string missing;
   for (const char* const name : {"sensor.yaml", "data.csv"})
     if (!present(where / name)) missing += (missing.empty() ? "" : " and ") + std::string{name};
@@ -149,8 +153,9 @@ struct asl_images {
 
 /// Reads the ground truth next to the cameras' folders, if it exists, converts it to poses of a camera, and sets the
 /// poses of the frames of `index`. Errors: unreadable, malformed (with file and line).
-[[nodiscard]] inline result<void> read_asl_truth(const std::filesystem::path& root, const se3& T_body_camera,
-                                                 recording_index& index) {
+template <class = void>
+[[nodiscard]] result<void> read_asl_truth(const std::filesystem::path& root, const se3& T_body_camera,
+                                          recording_index& index) {
   for (const char* const name : {"state_groundtruth_estimate0", "mocap0"}) {
     const auto file = root / name / "data.csv";
     if (!present(file)) continue;
@@ -167,7 +172,8 @@ struct asl_images {
 
 /// The index of a recording in the ASL layout. Images are paired within `max_time_difference` seconds; images without a
 /// partner are noted. Errors: not_found (a file), unreadable, no_data, malformed (with file and line), unsupported.
-[[nodiscard]] inline result<stereo_index> index_asl(const std::filesystem::path& folder, double max_time_difference) {
+template <class = void>
+[[nodiscard]] result<stereo_index> index_asl(const std::filesystem::path& folder, double max_time_difference) {
   const auto root = asl_root(folder);
   if (root.empty())
     return fail(errc::not_found, (folder / "mav0" / "cam0").string(), "no such folder; it must contain sensor.yaml");

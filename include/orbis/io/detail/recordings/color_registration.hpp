@@ -17,7 +17,8 @@
 namespace orbis::io::detail {
 
 /// Averages blocks of n x n pixels; drops leftover columns at the right and rows at the bottom. @pre n >= 1
-[[nodiscard]] inline image<rgb8> reduced(image_view<const rgb8> in, int n) {
+template <class = void>
+[[nodiscard]] image<rgb8> reduced(image_view<const rgb8> in, int n) {
   image<rgb8> out{in.width() / n, in.height() / n};
   const auto count = static_cast<unsigned>(n * n);
   for (int y = 0; y != out.height(); ++y)

@@ -24,14 +24,16 @@
 namespace orbis::io::detail {
 
 /// The file `*.gt.freiburg` in `folder`, or an empty path.
-inline std::filesystem::path icl_ground_truth(const std::filesystem::path& folder) {
+template <class = void>
+std::filesystem::path icl_ground_truth(const std::filesystem::path& folder) {
   for (const auto& path : list_folder(folder))
     if (path.filename().string().ends_with(".gt.freiburg")) return path;
   return {};
 }
 
 /// Converts a pose from left-handed frames (y up) to frames with y down by mirroring it in the x-z plane.
-inline se3 mirrored_y(const se3& pose) {
+template <class = void>
+se3 mirrored_y(const se3& pose) {
   const auto& q = pose.rotation().unit_quaternion();
   const vec3& t = pose.translation();
   return se3(so3(so3::quaternion(q.w(), -q.x(), q.y(), -q.z())), vec3(t.x(), -t.y(), t.z()));
@@ -39,14 +41,16 @@ inline se3 mirrored_y(const se3& pose) {
 
 /// Returns true if `folder` is an ICL-NUIM recording. It must contain the data set's trajectory file, because other
 /// recordings with numbered images come from other cameras.
-[[nodiscard]] inline bool is_icl_nuim(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] bool is_icl_nuim(const std::filesystem::path& folder) {
   return !present(folder / "rgb.txt") && present(folder / "rgb") && present(folder / "depth") &&
          !icl_ground_truth(folder).empty();
 }
 
 /// The index of an ICL-NUIM recording, with the data set's camera. Integer time stamps are converted to seconds at 30
 /// frames per second. Errors: those of `index_tum` and `index_image_folders`.
-[[nodiscard]] inline result<recording_index> index_icl_nuim(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] result<recording_index> index_icl_nuim(const std::filesystem::path& folder) {
   constexpr double frames_per_second = 30.0, max_time_difference = 0.5 / frames_per_second;
   auto read = find_association_list(folder).empty()
                   ? index_image_folders(folder, max_time_difference, frames_per_second)

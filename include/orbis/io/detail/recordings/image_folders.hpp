@@ -27,8 +27,9 @@
 namespace orbis::io::detail {
 
 /// The first subfolder of `folder` with one of these names, in upper or lower case; empty if there is none.
-[[nodiscard]] inline std::filesystem::path first_folder(const std::filesystem::path& folder,
-                                                        std::initializer_list<const char*> names) {
+template <class = void>
+[[nodiscard]] std::filesystem::path first_folder(const std::filesystem::path& folder,
+                                                 std::initializer_list<const char*> names) {
   const auto paths = list_folder(folder);
   for (const std::string_view name : names)
     for (const auto& path : paths) {
@@ -39,28 +40,32 @@ namespace orbis::io::detail {
 }
 
 /// The folder of colour images in `folder`; empty if there is none.
-[[nodiscard]] inline std::filesystem::path find_color_folder(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] std::filesystem::path find_color_folder(const std::filesystem::path& folder) {
   for (const char* const name : {"rgb", "color", "colour", "image", "images"})
     if (const auto path = first_folder(folder, {name}); !path.empty() && !images_in(path).empty()) return path;
   return {};
 }
 
 /// The folder of depth images in `folder`, registered ones first; empty if there is none.
-[[nodiscard]] inline std::filesystem::path find_depth_folder(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] std::filesystem::path find_depth_folder(const std::filesystem::path& folder) {
   return first_folder(
       folder, {"aligned_depth_to_color", "aligned_depth", "depth_aligned", "depth_registered", "depth", "depths"});
 }
 
 /// Returns true if `folder` contains a folder of colour images and a folder for depth images.
-[[nodiscard]] inline bool is_image_folders(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] bool is_image_folders(const std::filesystem::path& folder) {
   return !find_color_folder(folder).empty() && !find_depth_folder(folder).empty();
 }
 
 /// Pairs images by equal numbers, by times at most `max_time_difference` seconds apart, or by equal names. Errors:
 /// invalid_argument (the names do not match).
-[[nodiscard]] inline result<std::vector<index_pair>> pair_by_name(const keyed_images& color, const keyed_images& depth,
-                                                                  double max_time_difference,
-                                                                  const std::filesystem::path& where) {
+template <class = void>
+[[nodiscard]] result<std::vector<index_pair>> pair_by_name(const keyed_images& color, const keyed_images& depth,
+                                                           double max_time_difference,
+                                                           const std::filesystem::path& where) {
   if (color.keys_are != depth.keys_are || color.keys_are == image_keys::alphabet) {
     std::map<std::string, std::uint32_t> by_name;
     for (std::uint32_t d = 0; d != depth.paths.size(); ++d) by_name[depth.paths[d].stem().string()] = d;
@@ -81,8 +86,9 @@ namespace orbis::io::detail {
 /// The index of a recording in a folder of colour images and a folder of depth images. `fps`: frame rate of numbered
 /// images. Errors: not_found (a folder), no_data (no depth images, no pair), invalid_argument (names that do not
 /// match), unreadable, malformed (times, ground truth, with the line number).
-[[nodiscard]] inline result<recording_index> index_image_folders(const std::filesystem::path& folder,
-                                                                 double max_time_difference, double fps) {
+template <class = void>
+[[nodiscard]] result<recording_index> index_image_folders(const std::filesystem::path& folder,
+                                                          double max_time_difference, double fps) {
   const auto color_folder = find_color_folder(folder), depth_folder = find_depth_folder(folder);
   if (color_folder.empty())
     return fail(errc::not_found, folder.string(),

@@ -30,7 +30,8 @@
 namespace orbis::io::detail {
 
 /// The images directly in `folder`, sorted by name, excluding hidden files.
-[[nodiscard]] inline std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] std::vector<std::filesystem::path> images_in(const std::filesystem::path& folder) {
   auto paths = list_folder(folder);
   std::erase_if(paths,
                 [](const auto& path) { return !is_image_name(path) || path.filename().string().starts_with('.'); });
@@ -100,7 +101,8 @@ struct name_number {
 /// Orders images by their names: `1305031102.1753.png`, `1403636579763555584.png` and `1311868164_20000000.png`
 /// (seconds and nanoseconds) are times, `frame_000123.png` is frame 123. The most common form of the names is used;
 /// images with other names are left out. If no name has one of these forms, all images keep their alphabetical order.
-[[nodiscard]] inline keyed_images order_by_name(std::vector<std::filesystem::path> paths) {
+template <class = void>
+[[nodiscard]] keyed_images order_by_name(std::vector<std::filesystem::path> paths) {
   struct image {
     double key = 0.0;
     std::size_t index = 0;
@@ -152,8 +154,9 @@ struct name_number {
 
 /// Adds notes about images whose names do not determine their order, and about images that are left out because of
 /// their names. `has_times`: the times of the images are known from another source.
-inline void note_order(const std::filesystem::path& folder, const keyed_images& images, bool has_times,
-                       std::vector<std::string>& notes) {
+template <class = void>
+void note_order(const std::filesystem::path& folder, const keyed_images& images, bool has_times,
+                std::vector<std::string>& notes) {
   if (images.keys_are == image_keys::alphabet && !has_times)
     notes.push_back(folder.string() +
                     ": the names of the images are neither numbers nor times; they are read in alphabetical order");
@@ -163,8 +166,9 @@ inline void note_order(const std::filesystem::path& folder, const keyed_images& 
 }
 
 /// Adds a note that lists the subfolders of `folder` that contain images and are not in `used`.
-inline void note_unused_folders(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& used,
-                                std::vector<std::string>& notes) {
+template <class = void>
+void note_unused_folders(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& used,
+                         std::vector<std::string>& notes) {
   std::string unused;
   for (const auto& path : list_folder(folder)) {
     std::error_code ignored;
@@ -177,8 +181,9 @@ inline void note_unused_folders(const std::filesystem::path& folder, const std::
 
 /// Replaces the times of the images, in order, with those in `times.txt` or `timestamps.txt` in `folder`, if it exists;
 /// images without a time are removed and noted. Errors: unreadable, malformed (with file and line).
-[[nodiscard]] inline result<void> read_image_times(const std::filesystem::path& folder,
-                                                   std::vector<stamped_file>& images, recording_index& index) {
+template <class = void>
+[[nodiscard]] result<void> read_image_times(const std::filesystem::path& folder, std::vector<stamped_file>& images,
+                                            recording_index& index) {
   const auto file = first_present(folder, {"times.txt", "timestamps.txt"});
   if (file.empty()) return {};
   const auto text = read_file(file);

@@ -43,7 +43,8 @@ template <std::size_t N>
 }
 
 /// The pose in the frame of camera 0, in metres, of a camera with the projection matrix K [I t].
-[[nodiscard]] inline se3 kitti_place(const std::array<double, 12>& p) {
+template <class = void>
+[[nodiscard]] se3 kitti_place(const std::array<double, 12>& p) {
   return se3{so3{}, -vec3{(p[3] - p[2] * p[11]) / p[0], (p[7] - p[6] * p[11]) / p[5], p[11]}};
 }
 
@@ -55,8 +56,9 @@ struct kitti_calibration {
 
 /// Parses the projection matrix `P<camera>:` in `calib.txt`, stored row by row. Errors: malformed (missing, not a
 /// matrix, not a camera's matrix).
-[[nodiscard]] inline result<std::array<double, 12>> parse_kitti_projection(std::string_view text, int camera,
-                                                                           const std::filesystem::path& where) {
+template <class = void>
+[[nodiscard]] result<std::array<double, 12>> parse_kitti_projection(std::string_view text, int camera,
+                                                                    const std::filesystem::path& where) {
   const std::string wanted = "P" + std::to_string(camera);
   std::optional<std::array<double, 12>> found;
   std::size_t bad_line = 0;
@@ -75,8 +77,9 @@ struct kitti_calibration {
 
 /// Parses `calib.txt`: projection matrices `P<number>:` of 12 numbers. Errors: malformed (a matrix is missing or
 /// invalid, or the cameras are not a rectified pair).
-[[nodiscard]] inline result<kitti_calibration> parse_kitti_calibration(std::string_view text, int left, int right,
-                                                                       const std::filesystem::path& where) {
+template <class = void>
+[[nodiscard]] result<kitti_calibration> parse_kitti_calibration(std::string_view text, int left, int right,
+                                                                const std::filesystem::path& where) {
   const auto l = parse_kitti_projection(text, left, where), r = parse_kitti_projection(text, right, where);
   if (!l) return fail(l.error());
   if (!r) return fail(r.error());
@@ -90,8 +93,9 @@ struct kitti_calibration {
 
 /// Parses a file of poses: the first three rows of `T_world_camera`, 12 numbers per line. The entry of a lost pose
 /// (`is_lost_pose`) is empty. Errors: malformed, with the line number (not 12 numbers, not a rigid transform).
-[[nodiscard]] inline result<std::vector<std::optional<se3>>> parse_kitti_poses(std::string_view text,
-                                                                               const std::filesystem::path& where) {
+template <class = void>
+[[nodiscard]] result<std::vector<std::optional<se3>>> parse_kitti_poses(std::string_view text,
+                                                                        const std::filesystem::path& where) {
   std::vector<std::optional<se3>> poses;
   std::optional<error> problem;
   for_each_line(text, [&](std::string_view line, std::size_t number) {
@@ -114,10 +118,10 @@ struct kitti_calibration {
 /// folder or from the benchmark's file in `../../poses`; empty if neither exists. Adds the file to `index.files`.
 /// Adds notes if poses are lost, and if the number of poses differs from `times`, the number of time stamps. Errors:
 /// unreadable, malformed (with the line number).
-[[nodiscard]] inline result<std::vector<std::optional<se3>>> read_kitti_poses(const std::filesystem::path& folder,
-                                                                              const se3& T_first_camera,
-                                                                              std::size_t times,
-                                                                              recording_index& index) {
+template <class = void>
+[[nodiscard]] result<std::vector<std::optional<se3>>> read_kitti_poses(const std::filesystem::path& folder,
+                                                                       const se3& T_first_camera, std::size_t times,
+                                                                       recording_index& index) {
   const auto name = std::filesystem::absolute(folder / "").lexically_normal().parent_path().filename().string();
   for (const auto& file : {folder / "poses.txt", folder / ".." / ".." / "poses" / (name + ".txt")}) {
     if (!present(file)) continue;
@@ -142,9 +146,9 @@ struct kitti_calibration {
 }
 
 /// Adds frame `n` with its time and, if known, its pose.
-inline void add_kitti_frame(std::size_t n, const std::vector<double>& times,
-                            const std::vector<std::optional<se3>>& poses, const std::filesystem::path& color,
-                            const std::filesystem::path& depth, recording_index& index) {
+template <class = void>
+void add_kitti_frame(std::size_t n, const std::vector<double>& times, const std::vector<std::optional<se3>>& poses,
+                     const std::filesystem::path& color, const std::filesystem::path& depth, recording_index& index) {
   index.frames.push_back({times[n], color, depth, {}});
   if (n >= poses.size() || !poses[n]) return;
   index.frames.back().T_world_camera = poses[n];
@@ -153,8 +157,9 @@ inline void add_kitti_frame(std::size_t n, const std::vector<double>& times,
 
 /// Sorts the frames of a sequence by time; of several frames with the same number, keeps the first. `images`: the
 /// cameras' folders. Errors: no_data, and those of `check_first_frame`.
-[[nodiscard]] inline result<void> sort_kitti_frames(const std::vector<std::filesystem::path>& images, std::size_t times,
-                                                    recording_index& index) {
+template <class = void>
+[[nodiscard]] result<void> sort_kitti_frames(const std::vector<std::filesystem::path>& images, std::size_t times,
+                                             recording_index& index) {
   const auto folder = images.front().parent_path();
   if (index.frames.empty()) {
     std::string content;
@@ -179,7 +184,8 @@ inline void add_kitti_frame(std::size_t n, const std::vector<double>& times,
 }
 
 /// The indices of the left and right cameras whose folders exist, preferably the grey ones. Empty if there are none.
-[[nodiscard]] inline std::optional<std::pair<int, int>> kitti_cameras(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] std::optional<std::pair<int, int>> kitti_cameras(const std::filesystem::path& folder) {
   for (const auto& [left, right] : {std::pair{0, 1}, std::pair{2, 3}})
     if (present(folder / ("image_" + std::to_string(left))) && present(folder / ("image_" + std::to_string(right))))
       return std::pair{left, right};
@@ -187,14 +193,16 @@ inline void add_kitti_frame(std::size_t n, const std::vector<double>& times,
 }
 
 /// Returns true if `folder` looks like a KITTI odometry sequence.
-[[nodiscard]] inline bool is_kitti(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] bool is_kitti(const std::filesystem::path& folder) {
   return kitti_cameras(folder) && present(folder / "calib.txt");
 }
 
 /// The index of a sequence. Images without a partner or a time are skipped and noted. Errors: not_found (a folder, a
 /// file), unreadable, malformed (with file and line), no_data (no pair); and errors from reading the first image,
 /// which determines the image size.
-[[nodiscard]] inline result<stereo_index> index_kitti(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] result<stereo_index> index_kitti(const std::filesystem::path& folder) {
   const auto cameras = kitti_cameras(folder);
   if (!cameras)
     return fail(errc::not_found, folder.string(), "has no folders image_0 and image_1, or image_2 and image_3");

@@ -37,13 +37,15 @@ inline constexpr double mono_pose_distance = 0.020;
 // --- lists in the TUM layout --------------------------------------------------------------------
 
 /// The list of a camera's images; empty if there is none.
-[[nodiscard]] inline std::filesystem::path find_image_list(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] std::filesystem::path find_image_list(const std::filesystem::path& folder) {
   return first_present(folder, {"rgb.txt", "left.txt"});
 }
 
 /// The index of the images listed in `rgb.txt` or `left.txt`. `fps`: frame rate, used if the list has frame numbers
 /// instead of times. Errors: not_found, unreadable, no_data, malformed (ground truth, with its line).
-[[nodiscard]] inline result<recording_index> index_image_list(const std::filesystem::path& folder, double fps) {
+template <class = void>
+[[nodiscard]] result<recording_index> index_image_list(const std::filesystem::path& folder, double fps) {
   recording_index index;
   auto list = find_image_list(folder);
   if (list.empty()) list = folder / "rgb.txt";  // to name it in the error
@@ -61,14 +63,16 @@ inline constexpr double mono_pose_distance = 0.020;
 // --- ASL (EuRoC) --------------------------------------------------------------------------------
 
 /// The folder with `sensor.yaml` and `data.csv`: `folder` itself, or `cam0` of a recording; empty if there is none.
-[[nodiscard]] inline std::filesystem::path asl_camera_folder(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] std::filesystem::path asl_camera_folder(const std::filesystem::path& folder) {
   if (present(folder / "sensor.yaml") && present(folder / "data.csv") && present(folder / "data")) return folder;
   const auto root = asl_root(folder);
   return root.empty() ? root : root / "cam0";
 }
 
 /// The index of one camera in a recording in the ASL layout. Errors: those of `index_asl`.
-[[nodiscard]] inline result<recording_index> index_asl_camera(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] result<recording_index> index_asl_camera(const std::filesystem::path& folder) {
   auto where = asl_camera_folder(folder);
   if (where.empty()) where = folder / "mav0" / "cam0";
   recording_index index;
@@ -85,20 +89,23 @@ inline constexpr double mono_pose_distance = 0.020;
 // --- KITTI --------------------------------------------------------------------------------------
 
 /// Index of the first camera of a KITTI sequence that has images: left before right, grey before colour.
-[[nodiscard]] inline std::optional<int> kitti_camera(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] std::optional<int> kitti_camera(const std::filesystem::path& folder) {
   for (const int i : {0, 2, 1, 3})
     if (present(folder / ("image_" + std::to_string(i)))) return i;
   return std::nullopt;
 }
 
 /// Returns true if `folder` looks like a KITTI odometry sequence with at least one camera.
-[[nodiscard]] inline bool is_kitti_camera(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] bool is_kitti_camera(const std::filesystem::path& folder) {
   return kitti_camera(folder) && present(folder / "calib.txt");
 }
 
 /// The index of one camera of a sequence. The poses in the file are those of camera 0; they are converted to this
 /// camera. Errors: those of `index_kitti`.
-[[nodiscard]] inline result<recording_index> index_kitti_camera(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] result<recording_index> index_kitti_camera(const std::filesystem::path& folder) {
   const auto camera = kitti_camera(folder);
   if (!camera) return fail(errc::not_found, folder.string(), "has no folder image_0, image_1, image_2 or image_3");
   recording_index index;
@@ -138,7 +145,8 @@ inline constexpr double mono_pose_distance = 0.020;
 
 /// The folder with the most images: `folder` itself, or a subfolder with one of the usual names; empty if there are no
 /// images.
-[[nodiscard]] inline std::filesystem::path find_image_folder(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] std::filesystem::path find_image_folder(const std::filesystem::path& folder) {
   std::filesystem::path found;
   std::size_t most = 0;
   for (const auto& path : {folder, folder / "rgb", folder / "color", folder / "colour", folder / "image",
@@ -151,7 +159,8 @@ inline constexpr double mono_pose_distance = 0.020;
 /// `colour`, `image`, `images`, `left` or `data`. The names of the images determine their order (`order_by_name`);
 /// their times are those in `times.txt` or `timestamps.txt` (one per line), or in the names. `fps`: frame rate of
 /// numbered images. Errors: no_data, unreadable, malformed (with file and line).
-[[nodiscard]] inline result<recording_index> index_image_folder(const std::filesystem::path& folder, double fps) {
+template <class = void>
+[[nodiscard]] result<recording_index> index_image_folder(const std::filesystem::path& folder, double fps) {
   recording_index index;
   const auto where = find_image_folder(folder);
   if (where.empty())

@@ -20,7 +20,8 @@ namespace orbis::io::detail {
 
 /// The camera `given` by the user, or else the camera in `camera.toml` in `folder`, which is added to `files`; empty if
 /// neither exists. Errors: those of `read_camera`.
-[[nodiscard]] inline result<std::optional<camera::camera_settings>> given_camera(
+template <class = void>
+[[nodiscard]] result<std::optional<camera::camera_settings>> given_camera(
     const std::filesystem::path& folder, const std::optional<camera::camera_settings>& given,
     std::vector<std::filesystem::path>& files) {
   const auto file = folder / "camera.toml";
@@ -32,22 +33,24 @@ namespace orbis::io::detail {
 }
 
 /// Error for a recording whose camera is neither given nor known.
-[[nodiscard]] inline error unknown_camera(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] error unknown_camera(const std::filesystem::path& folder) {
   return {errc::invalid_argument, folder.string(),
           "the camera is not known: put a camera.toml into the folder, or specify a camera"};
 }
 
 /// Adds a note if the time between frames does not match a camera with `fps` frames per second.
-inline void note_interval(recording_index& index, double fps) {
+template <class = void>
+void note_interval(recording_index& index, double fps) {
   if (std::string warning = describe_interval(timestamps(index.frames), fps); !warning.empty())
     index.notes.push_back(std::move(warning));
 }
 
 /// If `camera` is empty, sets it to the camera of the index, with a note if that camera is guessed. Adds a note if the
 /// time between frames does not match the frame rate of the camera. Errors: invalid_argument (no camera is known).
-[[nodiscard]] inline result<void> complete_camera(const std::filesystem::path& folder,
-                                                  std::optional<camera::camera_settings>& camera,
-                                                  recording_index& index) {
+template <class = void>
+[[nodiscard]] result<void> complete_camera(const std::filesystem::path& folder,
+                                           std::optional<camera::camera_settings>& camera, recording_index& index) {
   if (!camera && index.camera && !index.camera_guess.empty()) {
     const camera::intrinsics& k = index.camera->model.k();
     char text[200];

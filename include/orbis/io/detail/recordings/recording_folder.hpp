@@ -39,7 +39,8 @@ template <class Entry>
 
 /// Sets the pose of every frame from the ground truth at its time: interpolated if poses are at most 0.2 s apart,
 /// otherwise the nearest within `max_distance` seconds.
-inline void attach_ground_truth(recording_index& index, double max_distance) {
+template <class = void>
+void attach_ground_truth(recording_index& index, double max_distance) {
   std::size_t without = 0;
   for (recording_entry& frame : index.frames) {
     frame.T_world_camera = interpolate(index.ground_truth, frame.timestamp, 0.2, max_distance);
@@ -52,7 +53,8 @@ inline void attach_ground_truth(recording_index& index, double max_distance) {
 
 /// Fails if a frame list is empty or its first images do not exist, because the whole list is then wrong. Later images
 /// are checked when they are read. Errors: no_data, not_found, unreadable (the folder).
-inline result<void> check_first_frame(const recording_index& index, const std::filesystem::path& where) {
+template <class = void>
+result<void> check_first_frame(const recording_index& index, const std::filesystem::path& where) {
   if (index.frames.empty()) return fail(errc::no_data, where.string(), "the recording has no frames");
   for (const std::filesystem::path& path : {index.frames.front().color, index.frames.front().depth}) {
     std::error_code why;
@@ -65,7 +67,8 @@ inline result<void> check_first_frame(const recording_index& index, const std::f
 }
 
 /// The regular files and folders directly in `folder`, sorted by name; empty if it cannot be read.
-[[nodiscard]] inline std::vector<std::filesystem::path> list_folder(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] std::vector<std::filesystem::path> list_folder(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> paths;
   std::error_code failure;
   for (std::filesystem::directory_iterator it{folder, failure}, end; !failure && it != end; it.increment(failure))
@@ -75,25 +78,29 @@ inline result<void> check_first_frame(const recording_index& index, const std::f
 }
 
 /// Returns true if the name of a file has the extension `.png`, in upper or lower case.
-[[nodiscard]] inline bool is_png_name(const std::filesystem::path& path) {
+template <class = void>
+[[nodiscard]] bool is_png_name(const std::filesystem::path& path) {
   return lower_cased(path.extension().string()) == ".png";
 }
 /// Returns true if the name of a file has the extension of a supported image format.
-[[nodiscard]] inline bool is_image_name(const std::filesystem::path& path) {
+template <class = void>
+[[nodiscard]] bool is_image_name(const std::filesystem::path& path) {
   const std::string ending = lower_cased(path.extension().string());
   return ending == ".png" || ending == ".jpg" || ending == ".jpeg";
 }
 
 /// Returns true if `path` exists. A symbolic link counts as existing even if its target is missing, so that the error
 /// names the link.
-[[nodiscard]] inline bool present(const std::filesystem::path& path) {
+template <class = void>
+[[nodiscard]] bool present(const std::filesystem::path& path) {
   std::error_code ignored;
   return std::filesystem::exists(std::filesystem::symlink_status(path, ignored));
 }
 
 /// The first of these names that exists in `folder`; empty if there is none.
-[[nodiscard]] inline std::filesystem::path first_present(const std::filesystem::path& folder,
-                                                         std::initializer_list<const char*> names) {
+template <class = void>
+[[nodiscard]] std::filesystem::path first_present(const std::filesystem::path& folder,
+                                                  std::initializer_list<const char*> names) {
   for (const char* const name : names)
     if (present(folder / name)) return folder / name;
   return {};
@@ -101,7 +108,8 @@ inline result<void> check_first_frame(const recording_index& index, const std::f
 
 /// Summary of a folder for a message: "holds calib.txt, 120 .png files, left/". At most eight items, each of which is a
 /// folder, a file, or all files with one extension.
-[[nodiscard]] inline std::string describe_content(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] std::string describe_content(const std::filesystem::path& folder) {
   constexpr std::size_t most = 8;
   std::vector<std::string> items;
   std::map<std::string, std::vector<std::string>> by_ending;
@@ -130,7 +138,8 @@ inline result<void> check_first_frame(const recording_index& index, const std::f
 }
 
 /// Fails if `folder` does not exist or is a file. Errors: not_found, unsupported (a file).
-[[nodiscard]] inline result<void> check_folder(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] result<void> check_folder(const std::filesystem::path& folder) {
   std::error_code ignored;
   if (!present(folder)) return fail(errc::not_found, folder.string(), "no such folder");
   if (!std::filesystem::is_directory(folder, ignored))
@@ -139,7 +148,8 @@ inline result<void> check_first_frame(const recording_index& index, const std::f
 }
 
 /// Error for a folder that is not a recording, with its content and the known layouts.
-[[nodiscard]] inline error unknown_recording(const std::filesystem::path& folder, const std::string& known) {
+template <class = void>
+[[nodiscard]] error unknown_recording(const std::filesystem::path& folder, const std::string& known) {
   return {errc::unsupported, folder.string(),
           "not a known recording; the folder " + describe_content(folder) + ";\n  known layouts: " + known};
 }

@@ -33,7 +33,8 @@
 namespace orbis::io::detail {
 
 /// The path of the calibration file `what` (such as "intrinsic_depth") of a ScanNet scene; empty if there is none.
-[[nodiscard]] inline std::filesystem::path scannet_file(const std::filesystem::path& folder, const std::string& what) {
+template <class = void>
+[[nodiscard]] std::filesystem::path scannet_file(const std::filesystem::path& folder, const std::string& what) {
   std::string plural = what;  // spelling in the smaller edition of the data set
   plural.insert(plural.find('_'), "s");
   for (const auto& path :
@@ -43,13 +44,15 @@ namespace orbis::io::detail {
 }
 
 /// Returns true if `folder` looks like an exported ScanNet scene.
-[[nodiscard]] inline bool is_scannet(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] bool is_scannet(const std::filesystem::path& folder) {
   return present(folder / "color") && present(folder / "depth") && !scannet_file(folder, "intrinsic_depth").empty();
 }
 
 /// The index of an exported scene, with times computed from the frame numbers at 30 frames per second. Its camera is
 /// the depth camera; see `color_registration`. Errors: not_found, unreadable, no_data, malformed (with the file).
-[[nodiscard]] inline result<recording_index> index_scannet(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] result<recording_index> index_scannet(const std::filesystem::path& folder) {
   constexpr double frames_per_second = 30.0;
   recording_index index;
   std::size_t without_depth = 0, without_pose = 0;

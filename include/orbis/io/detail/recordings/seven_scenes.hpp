@@ -31,7 +31,8 @@
 namespace orbis::io::detail {
 
 /// Parses a 3x3 camera matrix, or the upper left 3x3 block of a 4x4 matrix. Errors: malformed.
-[[nodiscard]] inline result<mat3> parse_camera_matrix(std::string_view text, const std::filesystem::path& path) {
+template <class = void>
+[[nodiscard]] result<mat3> parse_camera_matrix(std::string_view text, const std::filesystem::path& path) {
   double values[16];
   int count = 0;
   bool ok = true;
@@ -53,7 +54,8 @@ namespace orbis::io::detail {
 }
 
 /// Reads a camera matrix. Errors: not_found, unreadable, malformed.
-[[nodiscard]] inline result<mat3> read_camera_matrix(const std::filesystem::path& path) {
+template <class = void>
+[[nodiscard]] result<mat3> read_camera_matrix(const std::filesystem::path& path) {
   const auto text = read_file(path);
   if (!text) return fail(text.error());
   return parse_camera_matrix(*text, path);
@@ -62,7 +64,8 @@ namespace orbis::io::detail {
 inline constexpr std::string_view seven_scenes_color[] = {".color.png", ".color.jpg"};
 
 /// Returns true if `name` is the name of a colour image; if so, sets its stem and number.
-inline bool seven_scenes_frame(const std::string& name, std::string& stem, unsigned& number) {
+template <class = void>
+bool seven_scenes_frame(const std::string& name, std::string& stem, unsigned& number) {
   if (!name.starts_with("frame-")) return false;
   for (const std::string_view ending : seven_scenes_color) {
     if (!name.ends_with(ending)) continue;
@@ -72,7 +75,8 @@ inline bool seven_scenes_frame(const std::string& name, std::string& stem, unsig
   return false;
 }
 
-inline bool has_seven_scenes_frames(const std::filesystem::path& folder) {
+template <class = void>
+bool has_seven_scenes_frames(const std::filesystem::path& folder) {
   for (const auto& path : list_folder(folder)) {
     std::string stem;
     unsigned number = 0;
@@ -82,7 +86,8 @@ inline bool has_seven_scenes_frames(const std::filesystem::path& folder) {
 }
 
 /// The subfolders seq-XX that contain frames.
-inline std::vector<std::filesystem::path> seven_scenes_sequences(const std::filesystem::path& folder) {
+template <class = void>
+std::vector<std::filesystem::path> seven_scenes_sequences(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> found;
   for (const auto& path : list_folder(folder))
     if (path.filename().string().starts_with("seq-") && has_seven_scenes_frames(path)) found.push_back(path);
@@ -90,14 +95,16 @@ inline std::vector<std::filesystem::path> seven_scenes_sequences(const std::file
 }
 
 /// Returns true if `folder` looks like a 7-Scenes recording (or a scene with recordings in folders seq-XX).
-[[nodiscard]] inline bool is_seven_scenes(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] bool is_seven_scenes(const std::filesystem::path& folder) {
   return has_seven_scenes_frames(folder) || !seven_scenes_sequences(folder).empty();
 }
 
 /// Sets the pose of a frame from its pose file, if it exists, and adds it to the ground truth; counts a lost pose in
 /// `lost`. Errors: unreadable, malformed.
-[[nodiscard]] inline result<void> read_frame_pose(const std::filesystem::path& file, recording_entry& frame,
-                                                  recording_index& index, std::size_t& lost) {
+template <class = void>
+[[nodiscard]] result<void> read_frame_pose(const std::filesystem::path& file, recording_entry& frame,
+                                           recording_index& index, std::size_t& lost) {
   if (!present(file)) return {};
   const auto text = read_file(file);
   if (!text) return fail(text.error());
@@ -117,7 +124,8 @@ inline std::vector<std::filesystem::path> seven_scenes_sequences(const std::file
 /// is a scene with a single folder seq-XX, that folder is indexed. `camera-intrinsics.txt` is assumed to describe the
 /// depth camera, whose image size is that of the first depth image. Errors: no_data, not_found, unreadable, malformed
 /// (a pose, with its file), invalid_argument (a scene with several sequences).
-[[nodiscard]] inline result<recording_index> index_seven_scenes(std::filesystem::path folder) {
+template <class = void>
+[[nodiscard]] result<recording_index> index_seven_scenes(std::filesystem::path folder) {
   if (!has_seven_scenes_frames(folder)) {
     const auto sequences = seven_scenes_sequences(folder);
     if (sequences.size() > 1)

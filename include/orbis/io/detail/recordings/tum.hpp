@@ -103,7 +103,8 @@ template <class Entry, class Parse>
 }
 
 /// Cleans a file name in a list: removes quotes and trailing separators, and converts backslashes to slashes.
-[[nodiscard]] inline std::string listed_name(std::string_view name) {
+template <class = void>
+[[nodiscard]] std::string listed_name(std::string_view name) {
   while (!name.empty() && is_separator(name.back())) name.remove_suffix(1);
   if (name.size() >= 2 && name.front() == '"' && name.back() == '"') name = name.substr(1, name.size() - 2);
   std::string path{name};
@@ -114,11 +115,12 @@ template <class Entry, class Parse>
 /// Parses a list of lines with a time stamp (`parse_time_stamp`) and a file name, separated by blanks, a comma or a
 /// semicolon; see `parse_list`. File names are relative to `folder`. `unit`: unit of the time stamps; if empty, their
 /// number of digits determines it. Errors: no_data.
-[[nodiscard]] inline result<std::vector<stamped_file>> parse_image_list(std::string_view text,
-                                                                        const std::filesystem::path& list,
-                                                                        const std::filesystem::path& folder,
-                                                                        std::vector<std::string>& notes,
-                                                                        std::optional<time_unit> unit = {}) {
+template <class = void>
+[[nodiscard]] result<std::vector<stamped_file>> parse_image_list(std::string_view text,
+                                                                 const std::filesystem::path& list,
+                                                                 const std::filesystem::path& folder,
+                                                                 std::vector<std::string>& notes,
+                                                                 std::optional<time_unit> unit = {}) {
   return parse_list<stamped_file>(
       text, list, "a time stamp and a file name",
       [&](std::string_view line) -> std::optional<stamped_file> {
@@ -131,8 +133,9 @@ template <class Entry, class Parse>
 }
 
 /// Reads a list; see `parse_image_list`. Errors: not_found, unreadable, no_data.
-[[nodiscard]] inline result<std::vector<stamped_file>> read_image_list(const std::filesystem::path& list,
-                                                                       std::vector<std::string>& notes) {
+template <class = void>
+[[nodiscard]] result<std::vector<stamped_file>> read_image_list(const std::filesystem::path& list,
+                                                                std::vector<std::string>& notes) {
   const auto text = read_file(list);
   if (!text) return fail(text.error());
   return parse_image_list(*text, list, list.parent_path(), notes);
@@ -147,8 +150,9 @@ struct associated_files {
 /// Parses a line with two pairs of a time stamp and a file, in either order (the file whose path contains "depth" is
 /// the depth image; if neither or both contain it, colour is first). Fields are separated by blanks, commas or
 /// semicolons; file names may contain blanks if the second time stamp is the only number between them.
-[[nodiscard]] inline std::optional<associated_files> parse_association(std::string_view line,
-                                                                       const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] std::optional<associated_files> parse_association(std::string_view line,
+                                                                const std::filesystem::path& folder) {
   const std::optional<double> t1 = parse_time_stamp(next_separated(line));
   std::optional<double> t2;
   std::string file1, file2;
@@ -171,17 +175,19 @@ struct associated_files {
 
 /// Parses `associations.txt`; see `parse_association` and `parse_list`. File names are relative to the folder of
 /// `list`. Errors: no_data.
-[[nodiscard]] inline result<std::vector<associated_files>> parse_associations(std::string_view text,
-                                                                              const std::filesystem::path& list,
-                                                                              std::vector<std::string>& notes) {
+template <class = void>
+[[nodiscard]] result<std::vector<associated_files>> parse_associations(std::string_view text,
+                                                                       const std::filesystem::path& list,
+                                                                       std::vector<std::string>& notes) {
   return parse_list<associated_files>(
       text, list, "two pairs of a time stamp and a file name",
       [&](std::string_view line) { return parse_association(line, list.parent_path()); }, notes);
 }
 
 /// Reads `associations.txt`; see `parse_associations`. Errors: those of `read_image_list`.
-[[nodiscard]] inline result<std::vector<associated_files>> read_associations(const std::filesystem::path& list,
-                                                                             std::vector<std::string>& notes) {
+template <class = void>
+[[nodiscard]] result<std::vector<associated_files>> read_associations(const std::filesystem::path& list,
+                                                                      std::vector<std::string>& notes) {
   const auto text = read_file(list);
   if (!text) return fail(text.error());
   return parse_associations(*text, list, notes);
@@ -189,7 +195,8 @@ struct associated_files {
 
 /// Moves a trajectory and its notes into an index. Ground truth whose times are unusable (degenerate) is left out with
 /// a note. Errors: all other errors of `read`.
-[[nodiscard]] inline result<void> take_ground_truth(result<trajectory_reading> read, recording_index& index) {
+template <class = void>
+[[nodiscard]] result<void> take_ground_truth(result<trajectory_reading> read, recording_index& index) {
   if (!read && read.error().code == errc::degenerate) {
     index.notes.push_back(read.error().to_string() + "; the ground truth is not used");
     return {};
@@ -201,7 +208,8 @@ struct associated_files {
 }
 
 /// Converts the times of frames to seconds at `fps` frames per second if they are frame numbers, and adds a note.
-inline void convert_frame_numbers(recording_index& index, double fps) {
+template <class = void>
+void convert_frame_numbers(recording_index& index, double fps) {
   if (!are_frame_numbers(timestamps(index.frames))) return;
   for (recording_entry& frame : index.frames) {
     frame.timestamp /= fps;
@@ -215,7 +223,8 @@ inline void convert_frame_numbers(recording_index& index, double fps) {
 
 /// If the times of the ground truth are frame numbers, and more frames have a pose after the conversion, converts the
 /// times to seconds at `fps` frames per second and adds a note. @pre the times of the frames are in seconds
-inline void convert_numbered_truth(recording_index& index, double max_distance, double fps) {
+template <class = void>
+void convert_numbered_truth(recording_index& index, double max_distance, double fps) {
   if (!are_frame_numbers(timestamps(index.ground_truth))) return;
   const auto known = [&](const trajectory& truth) {
     return std::count_if(index.frames.begin(), index.frames.end(), [&](const recording_entry& frame) {
@@ -232,8 +241,9 @@ inline void convert_numbered_truth(recording_index& index, double max_distance, 
 /// Reads `groundtruth.txt` of a folder, if it exists, into an index that contains the frames already, and sets their
 /// poses (`attach_ground_truth`). `fps`: frames per second, for poses with frame numbers instead of times. Errors:
 /// unreadable, malformed (with the line number), unsupported.
-[[nodiscard]] inline result<void> read_ground_truth(const std::filesystem::path& folder, double max_time_difference,
-                                                    recording_index& index, double fps) {
+template <class = void>
+[[nodiscard]] result<void> read_ground_truth(const std::filesystem::path& folder, double max_time_difference,
+                                             recording_index& index, double fps) {
   const auto file = folder / "groundtruth.txt";
   if (!present(file)) return {};
   auto truth = read_trajectory_file(file);
@@ -247,19 +257,22 @@ inline void convert_numbered_truth(recording_index& index, double max_distance, 
 }
 
 /// The list of pairs of colour and depth images in `folder`, with one of the usual names; empty if there is none.
-[[nodiscard]] inline std::filesystem::path find_association_list(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] std::filesystem::path find_association_list(const std::filesystem::path& folder) {
   return first_present(folder, {"associations.txt", "association.txt", "associated.txt", "associate.txt", "assoc.txt"});
 }
 
 /// Returns true if `folder` looks like a TUM recording.
-[[nodiscard]] inline bool is_tum(const std::filesystem::path& folder) {
+template <class = void>
+[[nodiscard]] bool is_tum(const std::filesystem::path& folder) {
   return present(folder / "rgb.txt") || present(folder / "depth.txt") || !find_association_list(folder).empty();
 }
 
 /// Sets the camera of a TUM benchmark sequence if the name of `folder` begins with `freiburg1` (or 2, or 3), or if a
 /// folder in its path has a name that begins with `rgbd_dataset_freiburg1` (or 2, or 3); the innermost of these folders
 /// counts.
-inline void guess_tum_camera(const std::filesystem::path& folder, recording_index& index) {
+template <class = void>
+void guess_tum_camera(const std::filesystem::path& folder, recording_index& index) {
   const auto full = std::filesystem::absolute(folder / "").lexically_normal().parent_path();
   for (const auto& [word, preset] :
        {std::pair{"freiburg1", "tum_fr1"}, std::pair{"freiburg2", "tum_fr2"}, std::pair{"freiburg3", "tum_fr3"}}) {
@@ -283,8 +296,9 @@ inline void guess_tum_camera(const std::filesystem::path& folder, recording_inde
 /// (`guess_tum_camera`). If all time stamps are frame numbers, they are converted to seconds at `fps` frames per
 /// second. Errors: not_found (a list, the first image), unreadable, no_data (empty lists, no pair), malformed (ground
 /// truth, with the line number).
-[[nodiscard]] inline result<recording_index> index_tum(const std::filesystem::path& folder,
-                                                       double max_time_difference = 0.020, double fps = 30.0) {
+template <class = void>
+[[nodiscard]] result<recording_index> index_tum(const std::filesystem::path& folder, double max_time_difference = 0.020,
+                                                double fps = 30.0) {
   recording_index index;
   bool depth_is_whole = true;
   if (const auto list = find_association_list(folder); !list.empty()) {
@@ -332,10 +346,10 @@ inline void guess_tum_camera(const std::filesystem::path& folder, recording_inde
 
 /// Pairs left and right images whose times differ by at most `max_time_difference` seconds and adds them as frames;
 /// images without a partner are noted. Errors: no_data (no pair), not_found (the first images).
-[[nodiscard]] inline result<void> pair_images(const std::vector<stamped_file>& left,
-                                              const std::vector<stamped_file>& right,
-                                              const std::filesystem::path& where, double max_time_difference,
-                                              recording_index& to) {
+template <class = void>
+[[nodiscard]] result<void> pair_images(const std::vector<stamped_file>& left, const std::vector<stamped_file>& right,
+                                       const std::filesystem::path& where, double max_time_difference,
+                                       recording_index& to) {
   const auto left_times = timestamps(left), right_times = timestamps(right);
   for (const auto& [l, r] : associate(left_times, right_times, max_time_difference))
     to.frames.push_back({left_times[l], left[l].path, right[r].path, {}});
