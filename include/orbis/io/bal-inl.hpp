@@ -10,7 +10,6 @@
 #include <system_error>
 
 #include <orbis/core/file.hpp>
-#include <orbis/core/inline.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/io/bal.hpp>
 #include <orbis/io/detail/files/bal_parser.hpp>

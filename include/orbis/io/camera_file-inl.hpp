@@ -22,7 +22,6 @@
 #include <orbis/camera/plausible.hpp>
 #include <orbis/camera/radial_tangential.hpp>
 #include <orbis/core/file.hpp>
-#include <orbis/core/inline.hpp>
 #include <orbis/core/quote.hpp>
 #include <orbis/io/camera_file.hpp>
 #include <orbis/io/toml.hpp>

@@ -8,7 +8,6 @@
 #include <string_view>
 
 #include <orbis/core/file.hpp>
-#include <orbis/core/inline.hpp>
 #include <orbis/io/cloud_file.hpp>
 #include <orbis/io/detail/text.hpp>
 #include <orbis/io/pcd.hpp>

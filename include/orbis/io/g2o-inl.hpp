@@ -9,7 +9,6 @@
 #include <system_error>
 
 #include <orbis/core/file.hpp>
-#include <orbis/core/inline.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/io/detail/files/g2o_parser.hpp>
 #include <orbis/io/g2o.hpp>

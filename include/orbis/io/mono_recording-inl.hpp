@@ -6,7 +6,6 @@
 #include <cassert>
 #include <utility>
 
-#include <orbis/core/inline.hpp>
 #include <orbis/io/detail/recordings/one_camera.hpp>
 #include <orbis/io/detail/recordings/recording_camera.hpp>
 #include <orbis/io/detail/recordings/recording_folder.hpp>

@@ -8,15 +8,12 @@
 #include <cassert>
 #include <charconv>
 #include <cstddef>
-#include <cstdint>
 #include <ostream>
-#include <string>
 #include <type_traits>
 #include <utility>
 
 #include <orbis/core/bytes.hpp>
 #include <orbis/core/file.hpp>
-#include <orbis/core/inline.hpp>
 #include <orbis/io/detail/files/cloud_columns.hpp>
 #include <orbis/io/detail/files/lzf.hpp>
 #include <orbis/io/detail/files/pcd_format.hpp>

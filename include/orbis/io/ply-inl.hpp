@@ -7,13 +7,10 @@
 #include <charconv>
 #include <ostream>
 #include <set>
-#include <string>
-#include <string_view>
 #include <type_traits>
 
 #include <orbis/core/bytes.hpp>
 #include <orbis/core/file.hpp>
-#include <orbis/core/inline.hpp>
 #include <orbis/io/detail/files/cloud_columns.hpp>
 #include <orbis/io/detail/files/ply_format.hpp>
 #include <orbis/io/detail/files/scalar_type.hpp>

@@ -6,7 +6,6 @@
 #include <cassert>
 
 #include <orbis/camera/pinhole.hpp>
-#include <orbis/core/inline.hpp>
 #include <orbis/io/detail/recordings/color_registration.hpp>
 #include <orbis/io/detail/recordings/icl_nuim.hpp>
 #include <orbis/io/detail/recordings/image_folders.hpp>

@@ -7,7 +7,6 @@
 #include <cassert>
 
 #include <orbis/core/file.hpp>
-#include <orbis/core/inline.hpp>
 #include <orbis/io/detail/recordings/asl.hpp>
 #include <orbis/io/detail/recordings/image_names.hpp>
 #include <orbis/io/detail/recordings/kitti.hpp>

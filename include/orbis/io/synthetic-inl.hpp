@@ -6,7 +6,6 @@
 #include <cassert>
 #include <string>
 
-#include <orbis/core/inline.hpp>
 #include <orbis/io/detail/synthetic/camera_path.hpp>
 #include <orbis/io/detail/synthetic/looks.hpp>
 #include <orbis/io/detail/synthetic/scene.hpp>

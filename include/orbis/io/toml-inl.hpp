@@ -4,11 +4,8 @@
 #pragma once
 
 #include <algorithm>
-#include <string>
-#include <string_view>
 
 #include <orbis/core/file.hpp>
-#include <orbis/core/inline.hpp>
 #include <orbis/core/utf8.hpp>
 #include <orbis/io/toml.hpp>
 

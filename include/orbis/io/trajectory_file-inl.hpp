@@ -13,7 +13,6 @@
 #include <vector>
 
 #include <orbis/core/file.hpp>
-#include <orbis/core/inline.hpp>
 #include <orbis/io/detail/files/pose_text.hpp>
 #include <orbis/io/detail/files/time_list.hpp>
 #include <orbis/io/detail/text.hpp>
