@@ -18,5 +18,7 @@
 #else
 #define ORBIS_INLINE inline
 #define ORBIS_LAZY template <class = void>
-#define ORBIS_LAZY_INLINE template <class>
+#define ORBIS_LAZY_INLINE \
+  template <class>        \
+  inline
 #endif

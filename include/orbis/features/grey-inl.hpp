@@ -5,7 +5,6 @@
 
 #include <cstddef>
 
-#include <orbis/core/inline.hpp>
 #include <orbis/core/simd/dispatch.hpp>
 #include <orbis/core/simd/integer.hpp>
 #include <orbis/core/simd/shuffle.hpp>
@@ -86,7 +85,7 @@ struct luma_kernel {
 
 }  // namespace detail
 
-ORBIS_INLINE void luma(image_view<const rgb8> from, image_view<std::uint8_t> to) {
+ORBIS_LAZY_INLINE void luma(image_view<const rgb8> from, image_view<std::uint8_t> to) {
   assert(from.width() == to.width() && from.height() == to.height());
   const auto row = simd::kernel<detail::luma_kernel, detail::luma_kernel::signature, simd::avx2>();
   for (int y = 0; y < from.height(); ++y) row(from.row(y).data(), from.width(), to.row(y).data());

@@ -8,12 +8,13 @@
 #include <cstdint>
 
 #include <orbis/core/image.hpp>
+#include <orbis/core/inline.hpp>
 
 namespace orbis::features {
 
 /// Converts a colour image to luma (Rec. 601, rounded to nearest); bit-identical to OpenCV's COLOR_RGB2GRAY. O(pixels).
 /// @pre both images have the same size
-void luma(image_view<const rgb8> from, image_view<std::uint8_t> to);
+ORBIS_LAZY void luma(image_view<const rgb8> from, image_view<std::uint8_t> to);
 
 /// Converts a 16-bit image (infrared, thermal, raw) to 8 bits: values up to `low` become 0, values of at least `high`
 /// become 255, and those in between are scaled linearly and rounded. Use the same `low` and `high` for a whole

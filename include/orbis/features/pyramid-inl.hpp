@@ -5,14 +5,13 @@
 
 #include <cmath>
 
-#include <orbis/core/inline.hpp>
 #include <orbis/features/detail/extract/resize.hpp>
 #include <orbis/features/pyramid.hpp>
 
 namespace orbis::features {
 
-ORBIS_INLINE void image_pyramid::build(image_view<const std::uint8_t> image, int levels, double scale_factor,
-                                       int min_side) {
+ORBIS_LAZY_INLINE void image_pyramid::build(image_view<const std::uint8_t> image, int levels, double scale_factor,
+                                            int min_side) {
   assert(levels >= 0 && scale_factor > 1.0 && min_side >= 1);
   views_.clear();
   double scale = 1.0;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <orbis/core/image.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/features/detail/extract/resize_plan.hpp>
 
 namespace orbis::features {
@@ -29,7 +30,7 @@ class image_pyramid {
   /// with a side of less than `min_side` pixels, and all coarser levels, are omitted. O(pixels). Allocates nothing if
   /// a previous image had the same size.
   /// @pre levels >= 0, scale_factor > 1, min_side >= 1
-  void build(image_view<const std::uint8_t> image, int levels, double scale_factor, int min_side);
+  ORBIS_LAZY void build(image_view<const std::uint8_t> image, int levels, double scale_factor, int min_side);
 
   /// The number of levels.
   [[nodiscard]] std::size_t size() const noexcept { return views_.size(); }

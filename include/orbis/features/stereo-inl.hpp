@@ -3,7 +3,6 @@
 /// Implementation of stereo.hpp.
 #pragma once
 
-#include <orbis/core/inline.hpp>
 #include <orbis/core/simd/convert.hpp>
 #include <orbis/core/simd/dispatch.hpp>
 #include <orbis/core/simd/vec.hpp>
@@ -77,7 +76,7 @@ struct slide_differences_kernel {
   }
 };
 
-ORBIS_INLINE void slide_differences(const sliding_square& s, int shifts, std::int32_t* sums) {
+ORBIS_LAZY_INLINE void slide_differences(const sliding_square& s, int shifts, std::int32_t* sums) {
   simd::kernel<slide_differences_kernel, slide_differences_kernel::signature, simd::avx2>()(s, shifts, sums);
 }
 

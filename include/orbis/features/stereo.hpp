@@ -22,6 +22,7 @@
 #include <vector>
 
 #include <orbis/core/image.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/features/descriptor.hpp>
 #include <orbis/features/detail/extract/workspace_pool.hpp>
 #include <orbis/features/detail/match/search_among.hpp>
@@ -51,7 +52,7 @@ struct sliding_square {
 /// Sets `sums[k]` to four times the sum of absolute differences between the square and the strip starting at column
 /// `k`, each minus its mean (rounded to a quarter of a grey value), for k < `shifts`. Writes a multiple of 16 sums;
 /// those at index `shifts` and above are unspecified. @pre 1 <= side <= max_side, 1 <= shifts <= max_shifts
-void slide_differences(const sliding_square& s, int shifts, std::int32_t* sums);
+ORBIS_LAZY void slide_differences(const sliding_square& s, int shifts, std::int32_t* sums);
 
 }  // namespace detail
 

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/core/inline.hpp>
 #include <orbis/features/descriptor.hpp>
 #include <orbis/places/bag_of_words.hpp>
 #include <orbis/places/default_vocabulary.hpp>
@@ -43,7 +44,7 @@ class bag_of_words_places {
   using signature = places::bag_of_words;
 
   /// Uses the built-in vocabulary.
-  bag_of_words_places() : bag_of_words_places(places::default_vocabulary()) {}
+  ORBIS_LAZY bag_of_words_places() : bag_of_words_places(places::default_vocabulary()) {}
   explicit bag_of_words_places(places::vocabulary words) : words_{std::move(words)} {}
   bag_of_words_places(places::vocabulary words, const places::query_options& options)
       : words_{std::move(words)}, options_{options} {}
@@ -53,14 +54,16 @@ class bag_of_words_places {
   [[nodiscard]] std::size_t size() const noexcept { return database_.size(); }
 
   /// Returns the bag of words of an image.
-  [[nodiscard]] signature describe(const features::features& f) const { return words_.transform(f.descriptors); }
+  ORBIS_LAZY [[nodiscard]] signature describe(const features::features& f) const {
+    return words_.transform(f.descriptors);
+  }
 
   /// Adds a keyframe. Returns false if the keyframe is already in the database.
-  bool add(map_keyframe k, const signature& bow_vector) { return database_.add(packed(k), bow_vector); }
+  ORBIS_LAZY bool add(map_keyframe k, const signature& bow_vector) { return database_.add(packed(k), bow_vector); }
   /// Erases a keyframe. Returns false if the keyframe is not in the database.
-  bool erase(map_keyframe k) { return database_.erase(packed(k)); }
+  ORBIS_LAZY bool erase(map_keyframe k) { return database_.erase(packed(k)); }
   /// Changes the id of a keyframe. Returns false if `from` is not in the database, or if `to` already is.
-  bool rename(map_keyframe from, map_keyframe to) { return database_.rename(packed(from), packed(to)); }
+  ORBIS_LAZY bool rename(map_keyframe from, map_keyframe to) { return database_.rename(packed(from), packed(to)); }
 
   /// Returns at most `count` keyframes with similar bags of words, the most similar first (see `place_recognizer`).
   template <std::predicate<map_keyframe> Exclude, std::invocable<map_keyframe> Neighbors>

@@ -46,7 +46,7 @@ inline void keep_strongest(std::vector<corner>& corners, int wanted) {
   std::sort(corners.begin(), corners.end(), before_in_image);
 }
 
-ORBIS_INLINE void cover_first::operator()(std::span<level_corners> levels, int wanted, workspace& memory) const {
+ORBIS_LAZY_INLINE void cover_first::operator()(std::span<level_corners> levels, int wanted, workspace& memory) const {
   assign_quotas(levels, wanted, memory.quotas);
   take_covering(levels, wanted, memory);
   for (std::size_t l = 0; l != levels.size(); ++l) {
@@ -59,7 +59,8 @@ ORBIS_INLINE void cover_first::operator()(std::span<level_corners> levels, int w
 }
 
 /// Moves the strongest corner of each cell to `memory.covering`.
-ORBIS_INLINE void cover_first::take_covering(std::span<level_corners> levels, int wanted, workspace& memory) const {
+ORBIS_LAZY_INLINE void cover_first::take_covering(std::span<level_corners> levels, int wanted,
+                                                  workspace& memory) const {
   if (memory.covering.size() < levels.size()) memory.covering.resize(levels.size());
   for (auto& corners : memory.covering) corners.clear();
   std::size_t all = 0;

@@ -58,9 +58,9 @@ inline constexpr int band_rows = 64;
   return static_cast<float>(before - after) / static_cast<float>(2 * (before - 2 * middle + after));
 }
 
-ORBIS_INLINE void fast9::operator()(image_view<const std::uint8_t> image, const region& area,
-                                    const corner_thresholds& thresholds, workspace& memory,
-                                    std::vector<corner>& corners) const {
+ORBIS_LAZY_INLINE void fast9::operator()(image_view<const std::uint8_t> image, const region& area,
+                                         const corner_thresholds& thresholds, workspace& memory,
+                                         std::vector<corner>& corners) const {
   corners.clear();
   assert(cell >= 1 && 0 <= thresholds.weak && thresholds.weak <= thresholds.strong && thresholds.strong <= 254);
   assert(area.empty() || (area.x >= 0 && area.y >= 0 && area.x + area.width <= image.width() &&
@@ -69,8 +69,8 @@ ORBIS_INLINE void fast9::operator()(image_view<const std::uint8_t> image, const 
   if (thresholds.weak != thresholds.strong) drop_weak(area, thresholds.strong, memory, corners);
 }
 
-ORBIS_INLINE void fast9::find_peaks(image_view<const std::uint8_t> image, const region& area, int threshold,
-                                    workspace& memory, std::vector<corner>& corners) const {
+ORBIS_LAZY_INLINE void fast9::find_peaks(image_view<const std::uint8_t> image, const region& area, int threshold,
+                                         workspace& memory, std::vector<corner>& corners) const {
   // Scores are needed one pixel around the area, to test whether its outermost pixels are peaks.
   const int left = std::max(circle_radius, area.x - 1);
   const int right = std::min(image.width() - circle_radius, area.x + area.width + 1);
@@ -120,8 +120,8 @@ ORBIS_INLINE void fast9::find_peaks(image_view<const std::uint8_t> image, const 
 
 /// Smooths rows [first, last) and the pixels on the circles around them. Called for bands of rows, so that the pixels
 /// are still in the cache when the circles are evaluated.
-ORBIS_INLINE void fast9::smooth_band(image_view<const std::uint8_t> image, int left, int count, int first, int last,
-                                     workspace& memory) {
+ORBIS_LAZY_INLINE void fast9::smooth_band(image_view<const std::uint8_t> image, int left, int count, int first,
+                                          int last, workspace& memory) {
   const std::size_t pitch = static_cast<std::size_t>(count) + 2 * row_margin;
   const int from = left - circle_radius, columns = count + 2 * circle_radius;  // all columns are in the image
   const int from_more = std::max(0, from - 1), to_more = std::min(image.width(), from + columns + 1);
@@ -143,8 +143,8 @@ ORBIS_INLINE void fast9::smooth_band(image_view<const std::uint8_t> image, int l
   }
 }
 
-ORBIS_INLINE void fast9::drop_weak(const region& area, int strong, workspace& memory,
-                                   std::vector<corner>& corners) const {
+ORBIS_LAZY_INLINE void fast9::drop_weak(const region& area, int strong, workspace& memory,
+                                        std::vector<corner>& corners) const {
   const int columns = std::max(1, (area.width + cell / 2) / cell), rows = std::max(1, (area.height + cell / 2) / cell);
   memory.strongest.assign(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows), 0.0F);
   if (memory.cell_of.size() < corners.size()) memory.cell_of.resize(corners.size());

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <orbis/core/image.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/features/descriptor.hpp>
 #include <orbis/features/extractor.hpp>
 
@@ -42,15 +43,16 @@ struct fast9 {
 
   /// Replaces `corners` with the corners in the area. Pixels whose circle leaves the image are not corners. O(pixels of
   /// the area). @pre the area is inside the image; 0 <= weak <= strong <= 254; cell >= 1
-  void operator()(image_view<const std::uint8_t> image, const region& area, const corner_thresholds& thresholds,
-                  workspace& memory, std::vector<corner>& corners) const;
+  ORBIS_LAZY void operator()(image_view<const std::uint8_t> image, const region& area,
+                             const corner_thresholds& thresholds, workspace& memory,
+                             std::vector<corner>& corners) const;
 
  private:
-  void find_peaks(image_view<const std::uint8_t> image, const region& area, int threshold, workspace& memory,
-                  std::vector<corner>& corners) const;
-  static void smooth_band(image_view<const std::uint8_t> image, int left, int count, int first, int last,
-                          workspace& memory);
-  void drop_weak(const region& area, int strong, workspace& memory, std::vector<corner>& corners) const;
+  ORBIS_LAZY void find_peaks(image_view<const std::uint8_t> image, const region& area, int threshold, workspace& memory,
+                             std::vector<corner>& corners) const;
+  ORBIS_LAZY static void smooth_band(image_view<const std::uint8_t> image, int left, int count, int first, int last,
+                                     workspace& memory);
+  ORBIS_LAZY void drop_weak(const region& area, int strong, workspace& memory, std::vector<corner>& corners) const;
 };
 static_assert(corner_detector<fast9>);
 
@@ -74,10 +76,10 @@ struct cover_first {
   };
 
   /// @pre 0 <= share <= 1
-  void operator()(std::span<level_corners> levels, int wanted, workspace& memory) const;
+  ORBIS_LAZY void operator()(std::span<level_corners> levels, int wanted, workspace& memory) const;
 
  private:
-  void take_covering(std::span<level_corners> levels, int wanted, workspace& memory) const;
+  ORBIS_LAZY void take_covering(std::span<level_corners> levels, int wanted, workspace& memory) const;
 };
 static_assert(corner_selection<cover_first>);
 
@@ -89,7 +91,7 @@ struct intensity_centroid {
   static constexpr int radius = disc_radius;
 
   /// @pre the pixel is at least `radius` pixels from the image edge, and `radius` + 1 pixels from the right edge
-  [[nodiscard]] orientation operator()(image_view<const std::uint8_t> image, int x, int y) const;
+  ORBIS_LAZY [[nodiscard]] orientation operator()(image_view<const std::uint8_t> image, int x, int y) const;
 };
 static_assert(orientation_estimator<intensity_centroid>);
 
@@ -114,10 +116,10 @@ struct steered_brief {
 
   /// Smooths the pixels that descriptors of keypoints in rows `[first, last)` need. @pre the image has at least 4x4
   /// pixels
-  void prepare(image_view<const std::uint8_t> image, int first, int last, workspace& memory) const;
+  ORBIS_LAZY void prepare(image_view<const std::uint8_t> image, int first, int last, workspace& memory) const;
 
   /// @pre the pixel is at least `reach` pixels from the edge of the prepared image, and its row is prepared
-  [[nodiscard]] descriptor operator()(const workspace& prepared, int x, int y, const orientation& o) const;
+  ORBIS_LAZY [[nodiscard]] descriptor operator()(const workspace& prepared, int x, int y, const orientation& o) const;
 };
 static_assert(patch_descriptor<steered_brief>);
 

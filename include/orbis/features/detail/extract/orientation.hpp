@@ -112,7 +112,7 @@ struct disc_moments_kernel {
   return rounded < 2.0F * std::numbers::pi_v<float> ? rounded : 0.0F;
 }
 
-ORBIS_INLINE orientation intensity_centroid::operator()(image_view<const std::uint8_t> image, int x, int y) const {
+ORBIS_LAZY_INLINE orientation intensity_centroid::operator()(image_view<const std::uint8_t> image, int x, int y) const {
   assert(x >= radius && y >= radius && x + radius + 1 < image.width() && y + radius < image.height());
   const auto moments = simd::kernel<disc_moments_kernel, disc_moments_kernel::signature>();
   const image_moments m = moments(image.data() + y * image.stride() + x, image.stride());

@@ -139,7 +139,8 @@ struct resize_across_kernel {
 /// Bit-identical to OpenCV's INTER_LINEAR_EXACT. Fast for downscaling factors up to 1.8. Downscaling by a factor
 /// above 2 skips pixels. O(pixels of both images).
 /// @pre neither image is empty; every row of `to`, including the last, is writable up to a multiple of 32 pixels
-inline void resize(image_view<const std::uint8_t> from, image_view<std::uint8_t> to, resize_workspace& memory) {
+template <class = void>
+void resize(image_view<const std::uint8_t> from, image_view<std::uint8_t> to, resize_workspace& memory) {
   assert(!from.empty() && !to.empty());
   const auto along = simd::kernel<resize_along_kernel, resize_along_kernel::signature>();
   const auto across = simd::kernel<resize_across_kernel, resize_across_kernel::signature>();

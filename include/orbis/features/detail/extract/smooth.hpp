@@ -112,8 +112,9 @@ struct smooth_across_kernel {
 /// these parameters. O(pixels).
 /// @pre width >= 4, height >= 4; `to` has the size of `from`, and every row, including the last, is writable up to a
 /// multiple of 64 pixels
-inline void smooth(image_view<const std::uint8_t> from, image_view<std::uint8_t> to, int first, int last,
-                   smooth_workspace& memory) {
+template <class = void>
+void smooth(image_view<const std::uint8_t> from, image_view<std::uint8_t> to, int first, int last,
+            smooth_workspace& memory) {
   const int width = from.width(), height = from.height();
   assert(width >= 4 && height >= 4 && to.width() == width && to.height() == height);
   assert(first >= 0 && last <= height);

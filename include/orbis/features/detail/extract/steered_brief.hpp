@@ -129,8 +129,8 @@ struct steered_brief_kernel {
   }
 };
 
-ORBIS_INLINE void steered_brief::prepare(image_view<const std::uint8_t> image, int first, int last,
-                                         workspace& memory) const {
+ORBIS_LAZY_INLINE void steered_brief::prepare(image_view<const std::uint8_t> image, int first, int last,
+                                              workspace& memory) const {
   const std::ptrdiff_t stride = (static_cast<std::ptrdiff_t>(image.width()) + 63) / 64 * 64;
   const auto needed = static_cast<std::size_t>(stride) * static_cast<std::size_t>(image.height());
   if (memory.pixels.size() < needed) memory.pixels.resize(needed);
@@ -139,8 +139,8 @@ ORBIS_INLINE void steered_brief::prepare(image_view<const std::uint8_t> image, i
   memory.smoothed = to;
 }
 
-ORBIS_INLINE steered_brief::descriptor steered_brief::operator()(const workspace& prepared, int x, int y,
-                                                                 const orientation& o) const {
+ORBIS_LAZY_INLINE steered_brief::descriptor steered_brief::operator()(const workspace& prepared, int x, int y,
+                                                                      const orientation& o) const {
   const image_view<const std::uint8_t>& image = prepared.smoothed;
   assert(x >= reach && y >= reach && x + reach < image.width() && y + reach < image.height());
   const auto describe = simd::kernel<steered_brief_kernel, steered_brief_kernel::signature>();

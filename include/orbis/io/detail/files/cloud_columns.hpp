@@ -100,18 +100,15 @@ template <class = void>
   return store(value);
 }
 
-template <class = void>
-[[nodiscard]] double number_at(const cloud_field& column, std::size_t index) {
+[[nodiscard]] inline double number_at(const cloud_field& column, std::size_t index) {
   return load_as_double(column.bytes.data() + index * byte_size(column.type), column.type, std::endian::little);
 }
 
-template <class = void>
-rgb8 unpacked_rgb(std::uint32_t packed) {
+inline rgb8 unpacked_rgb(std::uint32_t packed) {
   return {static_cast<std::uint8_t>(packed >> 16), static_cast<std::uint8_t>(packed >> 8),
           static_cast<std::uint8_t>(packed)};
 }
-template <class = void>
-std::uint32_t packed_rgb(const rgb8& c) {
+inline std::uint32_t packed_rgb(const rgb8& c) {
   return static_cast<std::uint32_t>(c.r) << 16 | static_cast<std::uint32_t>(c.g) << 8 | c.b;
 }
 

@@ -41,8 +41,7 @@ constexpr decltype(auto) with_type(scalar_type type, F&& f) {
 }
 
 /// The number of type `type` stored at `from`.
-template <class = void>
-[[nodiscard]] double load_as_double(const char* from, scalar_type type, std::endian order) noexcept {
+[[nodiscard]] inline double load_as_double(const char* from, scalar_type type, std::endian order) noexcept {
   return with_type(type, [&](auto zero) { return static_cast<double>(load_number<decltype(zero)>(from, order)); });
 }
 

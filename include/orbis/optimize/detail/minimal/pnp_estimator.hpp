@@ -107,6 +107,7 @@ struct match_equations_kernel {
 };
 
 /// Pointers to the loops for this processor's instruction set.
+template <class = void>
 struct match_kernels {
   match_errors* errors = simd::kernel<match_errors_kernel, match_errors>();
   match_equations* equations = simd::kernel<match_equations_kernel, match_equations>();
@@ -256,7 +257,7 @@ class pnp_estimator {
   }
 
   Matches& matches_;
-  match_kernels kernels_{};
+  match_kernels<> kernels_{};
 };
 
 /// Returns the reason why the points do not determine a pose; empty if they do.
