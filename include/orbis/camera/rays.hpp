@@ -3,7 +3,6 @@
 /// Table with the ray through every pixel of a camera.
 #pragma once
 
-#include <cstddef>
 #include <limits>
 
 #include <orbis/camera/model.hpp>

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <cassert>
-#include <cmath>
 #include <concepts>
 #include <cstdint>
 #include <limits>

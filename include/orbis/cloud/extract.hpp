@@ -4,7 +4,6 @@
 #pragma once
 
 #include <cassert>
-#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <span>

@@ -17,7 +17,6 @@
 #include <system_error>
 #include <thread>
 #include <type_traits>
-#include <utility>
 #include <vector>
 
 #include <orbis/core/thread_pool.hpp>

@@ -18,7 +18,6 @@
 #include <array>
 #include <cmath>
 #include <concepts>
-#include <cstddef>
 #include <ranges>
 #include <tuple>
 #include <type_traits>

@@ -15,7 +15,6 @@
 
 #include <cmath>
 #include <concepts>
-#include <cstddef>
 #include <type_traits>
 
 #include <Eigen/Core>

@@ -6,11 +6,9 @@
 /// patterns", PAMI 13(4), 1991.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <orbis/core/jacobi.hpp>

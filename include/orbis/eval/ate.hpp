@@ -5,7 +5,6 @@
 /// Source: J. Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012.
 #pragma once
 
-#include <cstddef>
 #include <utility>
 #include <vector>
 

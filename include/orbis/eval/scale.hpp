@@ -3,7 +3,6 @@
 /// Scale of a trajectory relative to its reference, and its uncertainty.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>

@@ -7,11 +7,9 @@
 #include <cassert>
 #include <cmath>
 #include <concepts>
-#include <cstddef>
 #include <limits>
 #include <optional>
 #include <ranges>
-#include <span>
 #include <vector>
 
 #include <orbis/features/grid.hpp>

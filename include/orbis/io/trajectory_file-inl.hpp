@@ -10,7 +10,6 @@
 #include <ostream>
 #include <tuple>
 #include <utility>
-#include <vector>
 
 #include <orbis/core/file.hpp>
 #include <orbis/io/detail/files/pose_text.hpp>

@@ -10,7 +10,6 @@
 #include <cstdint>
 #include <optional>
 #include <ranges>
-#include <span>
 #include <type_traits>
 #include <utility>
 #include <vector>

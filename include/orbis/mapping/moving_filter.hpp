@@ -16,7 +16,6 @@
 #include <cstdint>
 #include <optional>
 #include <utility>
-#include <vector>
 
 #include <orbis/camera/depth.hpp>
 #include <orbis/camera/model.hpp>

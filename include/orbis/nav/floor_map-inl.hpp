@@ -10,7 +10,6 @@
 #include <cstddef>
 #include <limits>
 #include <numbers>
-#include <utility>
 #include <vector>
 
 #include <orbis/core/simd/dispatch.hpp>

@@ -15,7 +15,6 @@
 #include <array>
 #include <cstdint>
 #include <optional>
-#include <string>
 
 #include <orbis/core/image.hpp>
 #include <orbis/core/point.hpp>

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <concepts>
-#include <cstdint>
 
 #include <orbis/octree/accessor.hpp>
 #include <orbis/octree/key.hpp>

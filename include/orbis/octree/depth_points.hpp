@@ -3,9 +3,7 @@
 /// Points of a depth image in the world frame.
 #pragma once
 
-#include <algorithm>
 #include <any>
-#include <array>
 #include <cassert>
 #include <cmath>
 #include <concepts>

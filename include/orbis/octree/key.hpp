@@ -4,7 +4,6 @@
 /// voxels along the Morton curve.
 #pragma once
 
-#include <array>
 #include <cassert>
 #include <cmath>
 #include <cstdint>

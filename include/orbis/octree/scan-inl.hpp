@@ -4,7 +4,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cassert>
 
 #include <orbis/core/inline.hpp>
 #include <orbis/octree/detail/mark/scan_buffers.hpp>

@@ -14,9 +14,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <optional>
-#include <span>
-#include <utility>
 #include <vector>
 
 #include <orbis/camera/depth.hpp>

@@ -7,7 +7,6 @@
 #pragma once
 
 #include <concepts>
-#include <cstddef>
 #include <span>
 
 #include <orbis/core/execution.hpp>

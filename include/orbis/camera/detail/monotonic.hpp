@@ -10,7 +10,6 @@
 #include <cstddef>
 #include <limits>
 #include <optional>
-#include <utility>
 
 namespace orbis::camera::detail {
 

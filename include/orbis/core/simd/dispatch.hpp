@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <type_traits>
-#include <utility>
 
 #include <orbis/core/simd/level.hpp>
 

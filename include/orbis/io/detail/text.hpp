@@ -10,8 +10,6 @@
 #include <string>
 #include <string_view>
 #include <system_error>
-#include <utility>
-#include <vector>
 
 namespace orbis::io::detail {
 

@@ -5,7 +5,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 
 #include <orbis/camera/detail/shutter/row_warp.hpp>
 #include <orbis/core/simd.hpp>

@@ -9,9 +9,7 @@
 #include <cassert>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include <orbis/cloud/detail/voxels/voxel_key.hpp>

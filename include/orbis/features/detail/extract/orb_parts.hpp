@@ -3,7 +3,6 @@
 /// The parts of the ORB extractor. Implemented in fast.hpp, cover_first.hpp, orientation.hpp and steered_brief.hpp.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>

@@ -13,7 +13,6 @@
 #include <cstddef>
 #include <filesystem>
 #include <string>
-#include <string_view>
 #include <utility>
 
 #include <orbis/camera/pinhole.hpp>

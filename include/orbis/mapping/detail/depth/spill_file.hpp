@@ -12,7 +12,6 @@
 #include <iterator>
 #include <map>
 #include <span>
-#include <string>
 #include <system_error>
 #include <utility>
 #include <vector>

@@ -3,7 +3,6 @@
 /// Sums for fitting a plane to the levels of the columns around one column.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>

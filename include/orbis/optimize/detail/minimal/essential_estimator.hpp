@@ -3,9 +3,7 @@
 /// The RANSAC estimator of essential matrices.
 #pragma once
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>

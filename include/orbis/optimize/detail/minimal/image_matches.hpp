@@ -3,12 +3,10 @@
 /// Matches between the pixels of two images, converted for two-view geometry: at z = 1 and in random order.
 #pragma once
 
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include <orbis/camera/model.hpp>

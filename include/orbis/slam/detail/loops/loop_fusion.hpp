@@ -9,7 +9,6 @@
 /// T-RO 31 (2015), section VII.C.
 #pragma once
 
-#include <cstddef>
 #include <span>
 #include <vector>
 

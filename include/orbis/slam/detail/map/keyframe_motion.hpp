@@ -3,7 +3,6 @@
 /// Motion of keyframes together with their landmarks.
 #pragma once
 
-#include <algorithm>
 #include <cassert>
 #include <cstddef>
 #include <cstdint>

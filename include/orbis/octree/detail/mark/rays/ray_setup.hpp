@@ -3,10 +3,7 @@
 /// Preparation of rays as straight lines through planes of voxel faces, eight rays at a time.
 #pragma once
 
-#include <algorithm>
 #include <array>
-#include <bit>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
