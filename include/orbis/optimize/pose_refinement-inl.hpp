@@ -63,7 +63,7 @@ class pose_pieces {
     const pose_observation nothing{.point = vec3(0.0, 0.0, 1.0), .information = 0.0};
     for (std::size_t i = 0; i != padded(count); ++i) {
       const bool use = i < count && usable(observations_[first + i]);
-      const pose_observation& o = use ? observations_[first + i] : nothing;
+      const pose_observation o = use ? without_smear(observations_[first + i]) : nothing;
       lanes_.x[i] = o.point.x();
       lanes_.y[i] = o.point.y();
       lanes_.z[i] = o.point.z();

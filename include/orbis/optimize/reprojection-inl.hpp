@@ -19,12 +19,16 @@ ORBIS_ALWAYS_INLINE auto reprojection<Camera>::lanes_in_camera(const view&, cons
   const L shift = bf * inverse_z;
   r[0] = p.u - L::load(measurements);
   r[1] = p.v - L::load(measurements + 8);
-  r[2] = depth_weight * ((p.u - shift) - L::load(measurements + 16));
+  const L wx = L::load(measurements + 32), wy = L::load(measurements + 40), along = wx * r[0] + wy * r[1];
+  r[2] = depth_weight * ((p.u - shift) - L::load(measurements + 16) - along * wx);
+  r[0] -= along * wx;
+  r[1] -= along * wy;
   if constexpr (Derive) {
     for (int i = 0; i != 3; ++i) {
-      by_q[0][i] = p.j[0][i];
-      by_q[1][i] = p.j[1][i];
-      by_q[2][i] = depth_weight * (i == 2 ? p.j[0][2] + shift * inverse_z : p.j[0][i]);
+      const L change = wx * p.j[0][i] + wy * p.j[1][i];
+      by_q[0][i] = p.j[0][i] - change * wx;
+      by_q[1][i] = p.j[1][i] - change * wy;
+      by_q[2][i] = depth_weight * (i == 2 ? by_q[0][2] + shift * inverse_z : by_q[0][i]);
     }
   }
   return p.valid;

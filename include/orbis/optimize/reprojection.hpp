@@ -26,8 +26,34 @@ struct pose_observation {
   /// Weight of the third residual: sigma of the pixel divided by sigma of the right coordinate; finite and not
   /// negative.
   double depth_weight = 1.0;
+  /// Additional error of the pixel along a line, for example due to motion blur: the direction of the line, with the
+  /// standard deviation divided by sigma of the pixel as its length. The covariance of the pixel is `(I + s s^T) /
+  /// information`, and that of the depth is unchanged.
+  vec2 smear = zeros<vec2>();
   [[nodiscard]] bool has_depth() const noexcept { return !std::isnan(right); }
 };
+
+namespace detail {
+
+/// Returns `w` such that `I - w w^T` is the inverse square root of `I + smear smear^T`.
+[[nodiscard]] inline vec2 whitening(const vec2& smear) {
+  const double squared = squared_norm(smear);
+  if (squared == 0.0) return zeros<vec2>();
+  return std::sqrt((1.0 - 1.0 / std::sqrt(1.0 + squared)) / squared) * smear;
+}
+
+}  // namespace detail
+
+/// Returns a `pose_observation` or `bundle_observation` with its largest standard deviation in all directions, for
+/// methods that ignore the smear.
+template <class Observation>
+[[nodiscard]] Observation without_smear(Observation o) {
+  const double largest = 1.0 + squared_norm(o.smear);
+  o.information /= largest;
+  o.depth_weight *= std::sqrt(largest);
+  o.smear = zeros<vec2>();
+  return o;
+}
 
 /// A pose in the form used by residuals: the transform from the world to the camera frame.
 struct camera_view {
@@ -37,8 +63,10 @@ struct camera_view {
 
 /// The reprojection error, projected minus observed, in pixels: two coordinates and, with depth, a third: `u - bf / z`,
 /// the column in a camera displaced by the baseline. In terms of this column, the error of a disparity-based depth
-/// sensor is nearly constant, like that of the pixel. Satisfies `camera_frame_residual`; the estimated camera state is
-/// the pose `T_world_camera`. Source: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017).
+/// sensor is nearly constant, like that of the pixel. Along `pose_observation::smear`, the error of the pixel is
+/// divided by its larger standard deviation, also in the third coordinate. Satisfies `camera_frame_residual`; the
+/// estimated camera state is the pose `T_world_camera`. Source: R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33
+/// (2017).
 template <camera::camera_model Camera>
 struct reprojection {
   Camera camera;
@@ -68,6 +96,8 @@ struct reprojection {
     matrix<2, 3> projection;
     const auto pixel = camera.project(point_camera, projection);
     if (!pixel) return std::nullopt;
+    const vec2 w = detail::whitening(o.smear);
+    projection -= w * (transposed(w) * projection);
     set_block(j, 0, 0, projection);
     for (int i = 0; i != 3; ++i) j(2, i) = 0.0;
     if (o.has_depth()) {
@@ -101,23 +131,28 @@ struct reprojection {
   }
 
   // Evaluation of eight observations at a time; see detail/bundle/lane_residual.hpp.
-  static constexpr int measured = 4;
+  static constexpr int measured = 6;
   static void measure(const observation& o, double* to) {
     to[0] = o.pixel.x();
     to[8] = o.pixel.y();
     to[16] = std::isnan(o.right) ? 0.0 : o.right;
     to[24] = std::isnan(o.right) ? 0.0 : o.depth_weight;
+    const vec2 w = detail::whitening(o.smear);
+    to[32] = w.x();
+    to[40] = w.y();
   }
   template <bool Derive, class L>
   auto lanes_in_camera(const view&, const double* measurements, const L* q, L* r, L (*by_q)[3], L (*)[1]) const;
 
  private:
   [[nodiscard]] static pose_observation as_pose_observation(const observation& o) {
-    return {zeros<vec3>(), o.pixel, o.right, o.information, o.depth_weight};
+    return {zeros<vec3>(), o.pixel, o.right, o.information, o.depth_weight, o.smear};
   }
   [[nodiscard]] vec3 difference(const vec2& pixel, double z, const pose_observation& o) const {
-    return {pixel.x() - o.pixel.x(), pixel.y() - o.pixel.y(),
-            o.has_depth() ? o.depth_weight * (right(pixel.x(), z) - o.right) : 0.0};
+    const vec2 w = detail::whitening(o.smear), error = pixel - o.pixel;
+    const double along = dot(w, error);
+    return {error.x() - along * w.x(), error.y() - along * w.y(),
+            o.has_depth() ? o.depth_weight * (right(pixel.x(), z) - o.right - along * w.x()) : 0.0};
   }
 };
 

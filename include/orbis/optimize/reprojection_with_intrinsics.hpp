@@ -97,6 +97,8 @@ struct posed_camera_manifold {
 /// `bundle_options::fixed_poses` fixes the intrinsics of a camera together with its pose. For images from one known
 /// camera, use `reprojection`.
 ///
+/// `bundle_observation::depth_weight` and `smear` are ignored.
+///
 /// `bf` must be the value with which `bundle_observation::right` was computed. It stays constant, which is correct for
 /// sensors that measure depth, but not for a stereo pair whose focal length is estimated.
 template <camera::parametric_camera Camera, int... Free>

@@ -90,6 +90,7 @@ void check_step(const R& residual, const test::bundle& p) {
 TEST_CASE("The step by the Schur complement is that of the dense normal equations, on every path") {
   test::bundle p = test::make_bundle({.points = 61, .sigma = 1.0}, 21);
   p.observations[7].pixel += vec2(60, -40);  // beyond the loss's width
+  for (std::size_t k = 0; k < p.observations.size(); k += 3) p.observations[k].smear = vec2(3.0, -1.0);
   check_step(test::bundle_model, p);
   check_step(plain_reprojection{}, p);
   check_step(slow_reprojection{}, p);
