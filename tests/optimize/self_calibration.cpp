@@ -27,8 +27,9 @@ struct images {
   std::vector<optimize::bundle_observation> observations;
 };
 
-/// A lens that takes 15 images from everywhere around, or, with `motion` 0, from one place.
-images take_images(std::uint64_t seed, double sigma, double motion = 1.0) {
+/// A lens that takes 15 images from everywhere around, or, with `motion` 0, from one place. `fine`: factor of the pixel
+/// errors of every second observation.
+images take_images(std::uint64_t seed, double sigma, double motion = 1.0, double fine = 1.0) {
   random_bits random(seed);
   images all;
   for (int i = 0; i != 15; ++i) {
@@ -47,9 +48,11 @@ images take_images(std::uint64_t seed, double sigma, double motion = 1.0) {
       const auto pixel = truth.project(seen);
       if (!pixel || pixel->x() < 0 || pixel->y() < 0 || pixel->x() > 639 || pixel->y() > 479) continue;
       optimize::bundle_observation o{.pose = c, .point = p};
-      o.pixel = *pixel + sigma * vec2(random.normal(), random.normal());
+      const double share = all.observations.size() % 2 == 0 ? 1.0 : fine;
+      o.pixel = *pixel + share * sigma * vec2(random.normal(), random.normal());
+      o.depth_weight = share;
       if (p % 3 != 0) o.right = o.pixel.x() - bf / seen.z() + sigma * random.normal();
-      if (sigma > 0.0) o.information = 1.0 / (sigma * sigma);
+      if (sigma > 0.0) o.information = 1.0 / (share * share * sigma * sigma);
       all.observations.push_back(o);
     }
   }
@@ -93,8 +96,8 @@ TEST_CASE("The covariance of a self-calibration is that of its errors") {
   constexpr int runs = 20;
   double squared = 0.0;
   for (int run = 0; run != runs; ++run) {
-    images all = take_images(100 + static_cast<std::uint64_t>(run), 0.5);
-    for (auto& o : all.observations) o.information = 7.0;  // nobody knows the noise: it does not count
+    images all = take_images(100 + static_cast<std::uint64_t>(run), 0.5, 1.0, run % 2 == 0 ? 1.0 : 0.4);
+    for (auto& o : all.observations) o.information *= 2.0;  // the noise is estimated: the absolute value has no effect
     for (std::size_t k = 3; k < all.observations.size(); k += 50) all.observations[k].pixel += vec2(20, -15);
     const auto found = calibrate(wrong_lens(1.02, 0.98), all, {.bf = bf, .free = to_p2, .keeps_aspect = false});
     REQUIRE(found);

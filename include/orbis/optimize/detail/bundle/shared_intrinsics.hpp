@@ -298,7 +298,7 @@ class shared_intrinsics {
     const bundle_observation& o = observations_[k];
     auto r = residual_.residual(views[o.pose], points[o.point], o);
     if (r && !std::isnan(o.right))
-      (*r)[2] -= o.depth_weight * (*r)[0];  // only the depth error: bf times the difference of inverse depths
+      (*r)[2] = o.depth_weight * ((*r)[2] - (*r)[0]);  // only the depth error: the difference of inverse depths
     return r ? o.information * squared_norm(*r) : std::numeric_limits<double>::infinity();
   }
   [[nodiscard]] double total_cost(const estimate& e) const {
@@ -352,9 +352,9 @@ class shared_intrinsics {
       if (!r) continue;
       if (!std::isnan(o.right)) {
         const double w = o.depth_weight;
-        (*r)[2] -= w * (*r)[0];
-        for (int i = 0; i != 3; ++i) by_q(2, i) -= w * by_q(0, i);
-        for (int i = 0; i != parameters::count; ++i) by_all(2, i) -= w * by_all(0, i);
+        (*r)[2] = w * ((*r)[2] - (*r)[0]);
+        for (int i = 0; i != 3; ++i) by_q(2, i) = w * (by_q(2, i) - by_q(0, i));
+        for (int i = 0; i != parameters::count; ++i) by_all(2, i) = w * (by_all(2, i) - by_all(0, i));
       }
       s.takes_part = true;
       s.row = row_of_[o.pose];
