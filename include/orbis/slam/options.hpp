@@ -24,6 +24,7 @@ struct keyframe_options {
   /// Translation since the last keyframe that counts as motion, metres; without depth, in units of the median depth.
   double moved = 0.06;
   double turned = 0.06;             ///< rotation since the last keyframe that counts as motion, radians
+  double max_turned = 0.15;         ///< rotation since the last keyframe that triggers a new one at once, radians
   double inlier_ratio = 0.75;       ///< a frame with a smaller share of the reference's landmarks becomes a keyframe
   double inlier_ratio_start = 0.4;  ///< `inlier_ratio` while the map has only one keyframe
   std::size_t min_inliers = 15;     ///< no keyframe is created with this number of inliers or fewer
@@ -286,6 +287,7 @@ struct options {
 [[nodiscard]] inline options monocular_options(options settings = {}) {
   settings.scale_is_measured = false;
   settings.keyframes.moved = 0.03;
+  settings.keyframes.max_turned = std::numeric_limits<double>::infinity();  // rotation alone gives no parallax
   settings.keyframes.inlier_ratio = settings.keyframes.inlier_ratio_start = 0.9;
   settings.culling.min_support = 3;
   settings.culling.least_support = 2;

@@ -50,6 +50,13 @@ TEST_CASE("Each reason for a keyframe is enough, none is, if few landmarks are t
   CHECK(is_keyframe_due(moved, o));
   moved.inliers = 15;
   CHECK_FALSE(is_keyframe_due(moved, o));
+
+  auto turned = quiet;
+  turned.turned = 0.14;
+  CHECK_FALSE(is_keyframe_due(turned, o));  // too soon
+  turned.turned = 0.16;
+  CHECK(is_keyframe_due(turned, o));
+  CHECK_FALSE(is_keyframe_due(turned, slam::monocular_options().keyframes));  // a rotation gives no parallax
 }
 
 TEST_CASE("The evidence is counted from the map and the frame, which stay as they are") {

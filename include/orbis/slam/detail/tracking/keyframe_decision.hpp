@@ -52,15 +52,15 @@ template <feature_descriptor D>
 }
 
 /// Returns true if the view has changed significantly, if too few close keypoints observe landmarks and many others
-/// could become landmarks, or if some time has passed since the last keyframe and the camera has moved. Always false
-/// with too few inliers.
+/// could become landmarks, if the camera has turned far, or if some time has passed since the last keyframe and the
+/// camera has moved. Always false with too few inliers.
 [[nodiscard]] inline bool is_keyframe_due(const keyframe_evidence& e, const keyframe_options& o) {
   if (e.inliers <= o.min_inliers) return false;
   const double ratio = e.keyframes < 2 ? o.inlier_ratio_start : o.inlier_ratio;
   const bool view_changed = static_cast<double>(e.inliers) < ratio * static_cast<double>(e.reference);
   const bool needs_close = e.close_tracked < o.close_tracked && e.close_untracked > o.close_untracked;
   const bool has_moved = e.since >= o.interval && (e.moved >= o.moved || e.turned >= o.turned);
-  return view_changed || needs_close || has_moved;
+  return view_changed || needs_close || has_moved || e.turned >= o.max_turned;
 }
 
 }  // namespace orbis::slam::detail
