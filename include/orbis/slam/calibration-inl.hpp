@@ -61,6 +61,7 @@ template <feature_descriptor D, class Camera>
   const std::size_t count = std::min(shared.size(), options.max_landmarks);
   for (std::size_t i = 0; i != count; ++i)
     s.add_landmark(m, m.landmark_at(shared[i * shared.size() / count]), rig, index_of);
+  for (optimize::bundle_observation& o : s.observations) o = optimize::without_smear(o);
   return s;
 }
 

@@ -58,6 +58,13 @@ struct keypoint_as_read {
   depth_change change{};            ///< change of `depth`; zero unless the shutter is estimated
 };
 
+/// Uncertainty of a keypoint's position, in pixels of its pyramid level: the covariance is `deviation^2 I + s s^T`,
+/// where s = (smear_x, smear_y).
+struct pixel_spread {
+  float deviation = 1.0F;                ///< standard deviation in all directions
+  float smear_x = 0.0F, smear_y = 0.0F;  ///< direction of the motion blur times the standard deviation along it
+};
+
 /// An image represented by features with descriptors of type `D`. Each vector has one entry per keypoint; some vectors
 /// may be empty.
 template <feature_descriptor D>
@@ -68,10 +75,8 @@ struct basic_frame {
   std::size_t index = 0;   ///< index in the recording, from 0
   se3 T_world_camera;      ///< pose in the world frame of its map
   orbis::features::basic_features<D> features;
-  std::vector<float> depth;  ///< metres along z; 0 if not measured
-  /// Standard deviation of the position of each keypoint, in pixels of its pyramid level; empty: all are 1. Not stored
-  /// in map files.
-  std::vector<float> deviations;
+  std::vector<float> depth;                   ///< metres along z; 0 if not measured
+  std::vector<pixel_spread> spreads;          ///< of each keypoint; empty: all are the default. Not stored in map files
   std::vector<vec3> rays;                     ///< ray through each keypoint, scaled to z = 1; NaN if the pixel has none
   std::vector<landmark_id> landmarks;         ///< landmark observed by each keypoint, or `no_id`
   orbis::features::keypoint_grid grid;        ///< search grid of the keypoints
@@ -93,10 +98,8 @@ struct basic_frame {
   [[nodiscard]] vec3 point_camera(std::size_t i) const { return static_cast<double>(depth[i]) * rays[i]; }
   /// Like `point_camera`, in the world frame. @pre has_depth(i)
   [[nodiscard]] vec3 point_world(std::size_t i) const { return T_world_camera * point_camera(i); }
-  /// Returns the standard deviation of keypoint `i`, in pixels of its pyramid level.
-  [[nodiscard]] double deviation(std::size_t i) const {
-    return deviations.empty() ? 1.0 : static_cast<double>(deviations[i]);
-  }
+  /// Returns the uncertainty of the position of keypoint `i`.
+  [[nodiscard]] pixel_spread spread(std::size_t i) const { return spreads.empty() ? pixel_spread{} : spreads[i]; }
   [[nodiscard]] vec2 pixel(std::size_t i) const { return {features.keypoints[i].x, features.keypoints[i].y}; }
 };
 

@@ -23,7 +23,9 @@ struct landmark_patch {
   std::shared_ptr<const pixel_array> pixels;  ///< row by row; null: the landmark has no patch
   vec3 across = zeros<vec3>();    ///< step from a pixel to the next one in its row, in the world frame, metres
   vec3 down = zeros<vec3>();      ///< step from a row to the next one, in the world frame, metres
-  double corner_deviation = 1.0;  ///< standard deviation of a corner's position along the motion blur, pixels
+  float corner_deviation = 1.0F;  ///< standard deviation of a corner's position along the motion blur, pixels
+  float coarseness = 1.0F;        ///< size of its pixels, in pixels of the level of the keypoint where it was taken
+  bool is_flat = true;            ///< false if depth shows more than one surface in it, which move differently
   vec2 motion = zeros<vec2>();    ///< velocity of the landmark in the image, patch pixels per second
 
   /// Moves the surface by a motion in the world frame.

@@ -199,8 +199,11 @@ void basic_map<D>::fuse(landmark_id from, landmark_id into) {
   assert(from != into && has_landmark(into));
   landmark_type l = remove(from, into);
   for (const observation& o : l.observations)
-    if (add_observation(into, o.keyframe, o.feature) && l.patch.pixels != nullptr)  // measured with the patch of `l`
-      set_deviation(o.keyframe, o.feature, std::max(at(o.keyframe).deviation(o.feature), l.patch.corner_deviation));
+    if (add_observation(into, o.keyframe, o.feature) && l.patch.pixels != nullptr) {  // measured with the patch of `l`
+      pixel_spread spread = at(o.keyframe).spread(o.feature);
+      spread.deviation = std::max(spread.deviation, l.patch.corner_deviation);
+      set_spread(o.keyframe, o.feature, spread);
+    }
   landmark_type& by = content_.landmarks[into];
   if (by.patch.pixels == nullptr) by.patch = std::move(l.patch);
   by.found += l.found;
@@ -293,7 +296,7 @@ template <feature_descriptor D>
 void basic_map<D>::release(const observation& o) {
   keyframe_type& k = content_.keyframes[o.keyframe];
   k.landmarks[o.feature] = no_id;
-  if (!k.deviations.empty()) k.deviations[o.feature] = std::max(1.0F, k.deviations[o.feature]);
+  if (!k.spreads.empty()) k.spreads[o.feature].deviation = std::max(1.0F, k.spreads[o.feature].deviation);
 }
 
 template <feature_descriptor D>

@@ -131,11 +131,11 @@ class basic_map {
   void set_position(landmark_id id, const vec3& position) { content_.landmarks[id].position = position; }
   /// @pre has_landmark(id)
   void set_patch(landmark_id id, landmark_patch patch) { content_.landmarks[id].patch = std::move(patch); }
-  /// Sets the standard deviation of a keypoint (`basic_frame::deviations`). @pre has_keyframe(id)
-  void set_deviation(keyframe_id id, std::uint32_t feature, double deviation) {
-    auto& of_keyframe = content_.keyframes[id].deviations;
-    of_keyframe.resize(at(id).size(), 1.0F);
-    of_keyframe[feature] = static_cast<float>(deviation);
+  /// Sets the uncertainty of a keypoint (`basic_frame::spreads`). @pre has_keyframe(id)
+  void set_spread(keyframe_id id, std::uint32_t feature, const pixel_spread& spread) {
+    auto& of_keyframe = content_.keyframes[id].spreads;
+    of_keyframe.resize(at(id).size());
+    of_keyframe[feature] = spread;
   }
   /// Moves a keyframe by `T_new_old`, a motion in the world frame; multiplies `scale(id)` by the scale of the motion.
   /// @pre has_keyframe(id)

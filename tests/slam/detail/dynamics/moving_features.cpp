@@ -90,8 +90,8 @@ struct scene {
 
 TEST_CASE("Features are taken out of a frame in all its lists") {
   scene s;
-  s.last.deviations.resize(s.last.size());
-  for (std::size_t i = 0; i < s.last.size(); ++i) s.last.deviations[i] = static_cast<float>(i);
+  s.last.spreads.resize(s.last.size());
+  for (std::size_t i = 0; i < s.last.size(); ++i) s.last.spreads[i].deviation = static_cast<float>(i);
   slam::frame f = s.last;
   std::vector<std::uint8_t> out(f.size());
   for (std::size_t i = 0; i < f.size(); i += 3) out[i] = 1;
@@ -104,8 +104,8 @@ TEST_CASE("Features are taken out of a frame in all its lists") {
   CHECK(f.features.keypoints[2].x == s.last.features.keypoints[4].x);
   CHECK(f.depth[2] == s.last.depth[4]);
   CHECK(f.rays[2] == s.last.rays[4]);
-  CHECK(f.deviations.size() == f.size());
-  CHECK(f.deviations[2] == 4.0F);
+  CHECK(f.spreads.size() == f.size());
+  CHECK(f.spreads[2].deviation == 4.0F);
   std::vector<std::uint32_t> near;
   f.grid.for_each_near(f.features.keypoints[2].x, f.features.keypoints[2].y, 0.5F, 0, 8,
                        [&](std::uint32_t i) { near.push_back(i); });

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <utility>
+#include <vector>
 
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/features/pyramid.hpp>
@@ -122,11 +123,11 @@ TEST_CASE("Keypoints move to where their landmarks are, and are trusted more") {
   CHECK(error_of(s.w, s.next, s.m, s.T_world_next) > 1.0);
   REQUIRE(s.patches.align(s.next, s.m, s.twist));
   CHECK(error_of(s.w, s.next, s.m, s.T_world_next) < 0.1);
-  CHECK(std::count_if(s.next.deviations.begin(), s.next.deviations.end(), [](float d) { return d < 1.0F; }) ==
-        static_cast<std::ptrdiff_t>(s.next.size()));
+  REQUIRE(s.next.spreads.size() == s.next.size());
   for (std::size_t i = 0; i != s.next.size(); ++i) {  // rays and depths follow
     CHECK(norm(s.next.point_world(i) - s.w.seen(s.T_world_next, s.next.pixel(i))) < 1e-3);
-    CHECK(s.m.at(0).deviation(i) < 1.0);  // the keyframe defines the landmarks
+    CHECK(s.next.spread(i).deviation < 1.0F);
+    CHECK(s.m.at(0).spread(i).deviation < 1.0F);  // the keyframe defines the landmarks
   }
 }
 
@@ -165,6 +166,82 @@ TEST_CASE("The exposure is found from the blur of patches") {
   CHECK(error_of(s.w, blurred, s.m, s.T_world_next) < 0.2);
 }
 
+TEST_CASE("Positions in a blurred image are uncertain along the motion") {
+  wall w;
+  w.options.patches.exposure = 0.02;
+  tracker patches{w.rig, w.options.patches};
+  const vec6 twist = stacked(zeros<vec3>(), vec3(0.0, 1.5, 0.0));  // streaks of about 8 pixels along the rows
+  w.render(se3{}, twist, *w.options.patches.exposure);
+  patches.set_image(w.frame_image(se3{}));
+  slam::map m{4, 1.2};
+  const slam::frame first = w.frame_at(se3{}, 0);
+  patches.add_patches(m, slam::detail::insert_keyframe(m, first, w.options), first, twist);
+  slam::frame next = w.frame_at(se3{}, 1);
+  next.landmarks = m.at(0).landmarks;
+  next.landmarks[0] = slam::no_id;
+  REQUIRE(patches.align(next, m, twist));
+  const double scale = w.rig.scales.scale(next.features.keypoints[0].octave);
+  const slam::pixel_spread corner = next.spread(0);  // anywhere on its streak
+  CHECK(corner.deviation == 1.0F);
+  CHECK(std::abs(corner.smear_x) == Catch::Approx(0.02 * 1.5 * 260.0 / scale / std::sqrt(12.0)).epsilon(0.2));
+  CHECK(std::abs(corner.smear_y) < 0.2F);
+  for (std::size_t i = 1; i != next.size(); ++i) {
+    CHECK(next.spread(i).deviation < 1.0F);
+    CHECK(std::abs(next.spread(i).smear_x) > 0.01F);
+    CHECK(std::abs(next.spread(i).smear_x) < std::abs(corner.smear_x));
+    CHECK(m.at(0).spread(i).smear_x == 0.0F);
+  }
+}
+
+TEST_CASE("Patches with long streaks are taken from a coarser level") {
+  const auto coarseness = [](double turn) {
+    wall w;
+    w.options.patches.exposure = 0.02;
+    tracker patches{w.rig, w.options.patches};
+    const vec6 twist = stacked(zeros<vec3>(), vec3(0.0, turn, 0.0));
+    w.render(se3{}, twist, *w.options.patches.exposure);
+    patches.set_image(w.frame_image(se3{}));
+    slam::map m{4, 1.2};
+    const slam::frame first = w.frame_at(se3{}, 0);
+    patches.add_patches(m, slam::detail::insert_keyframe(m, first, w.options), first, twist);
+    slam::frame next = w.frame_at(se3{}, 1);
+    next.landmarks = m.at(0).landmarks;
+    CHECK(patches.align(next, m, twist));
+    CHECK(error_of(w, next, m, se3{}) < 0.05);  // found where they were taken
+    std::vector<float> of_level(3);
+    for (std::size_t i = 0; i != first.size(); ++i)
+      of_level[static_cast<std::size_t>(first.features.keypoints[i].octave)] =
+          m.landmark_at(m.at(0).landmarks[i]).patch.coarseness;
+    return of_level;
+  };
+  CHECK(coarseness(1.0) == std::vector{1.0F, 1.0F, 1.0F});  // 5 pixels
+  const std::vector<float> of_level = coarseness(2.2);      // 11.5 pixels
+  CHECK(of_level[0] == Catch::Approx(1.2));
+  CHECK(of_level[1] == 1.0F);
+  CHECK(of_level[2] == 1.0F);
+}
+
+TEST_CASE("Patches that show several surfaces are trusted less") {
+  const auto spread = [](double step) {
+    wall w;
+    tracker patches{w.rig, w.options.patches};
+    w.render(se3{});
+    const auto depth_at = [step](const vec2& pixel) { return pixel.x() > 162.0 ? 2.0 - step : 2.0; };
+    patches.set_image({&w.levels, depth_at});
+    slam::map m{4, 1.2};
+    const slam::frame first = w.frame_at(se3{}, 0);
+    patches.add_patches(m, slam::detail::insert_keyframe(m, first, w.options), first, zeros<vec6>());
+    slam::frame next = w.frame_at(se3{}, 1);
+    next.landmarks = m.at(0).landmarks;
+    CHECK(patches.align(next, m, zeros<vec6>()));
+    std::size_t i = 0;
+    while (!(first.features.keypoints[i].x == 160.0F)) ++i;
+    return next.spread(i).deviation;
+  };
+  CHECK(spread(0.2) == Catch::Approx(3.0 * spread(0.0)));
+  CHECK(spread(0.02) == spread(0.0));
+}
+
 TEST_CASE("Without an image, or without patches, keypoints stay") {
   scene s(moves, 0.0);
   s.patches.set_image({});
@@ -175,7 +252,7 @@ TEST_CASE("Without an image, or without patches, keypoints stay") {
   const slam::frame before = s.next;
   CHECK_FALSE(s.patches.align(s.next, s.m, s.twist));
   CHECK(s.next.features.keypoints == before.features.keypoints);
-  CHECK(s.next.deviations.empty());
+  CHECK(s.next.spreads.empty());
 }
 
 TEST_CASE("Keypoints that lose their landmark move back to where the detector found them") {
@@ -189,7 +266,7 @@ TEST_CASE("Keypoints that lose their landmark move back to where the detector fo
   CHECK(s.next.rays[3] == before.rays[3]);
   CHECK(s.next.depth[3] == before.depth[3]);
   CHECK(s.next.as_read[3].x == before.as_read[3].x);
-  CHECK(s.next.deviation(3) >= 1.0);
+  CHECK(s.next.spread(3).deviation >= 1.0F);
   CHECK_FALSE(s.next.features.keypoints[4] == before.features.keypoints[4]);
   s.patches.move_back(s.next, true);
   CHECK(s.next.features.keypoints == before.features.keypoints);

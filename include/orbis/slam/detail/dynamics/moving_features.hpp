@@ -39,7 +39,7 @@ void remove_features(basic_frame<D>& f, std::span<const std::uint8_t> leave_out)
     f.depth[kept] = f.depth[i];
     f.rays[kept] = f.rays[i];
     f.landmarks[kept] = f.landmarks[i];
-    if (!f.deviations.empty()) f.deviations[kept] = f.deviations[i];
+    if (!f.spreads.empty()) f.spreads[kept] = f.spreads[i];
     if (!f.as_read.empty()) f.as_read[kept] = f.as_read[i];
     ++kept;
   }
@@ -48,7 +48,7 @@ void remove_features(basic_frame<D>& f, std::span<const std::uint8_t> leave_out)
   f.depth.resize(kept);
   f.rays.resize(kept);
   f.landmarks.resize(kept);
-  if (!f.deviations.empty()) f.deviations.resize(kept);
+  if (!f.spreads.empty()) f.spreads.resize(kept);
   if (!f.as_read.empty()) f.as_read.resize(kept);
   f.grid = features::keypoint_grid(f.features.keypoints);
 }

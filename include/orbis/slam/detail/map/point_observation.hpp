@@ -29,12 +29,13 @@ template <camera::camera_model Camera, feature_descriptor D>
   return o;
 }
 
-/// Sets the weights of an observation of the keypoint's own landmark. `deviation`: standard deviation of the keypoint's
-/// position, pixels of its level (`basic_frame::deviation`). The standard deviation of the depth is unchanged, but the
-/// third residual also depends on the deviation of the pixel.
-inline void set_deviation(optimize::pose_observation& o, double deviation) {
+/// Sets the weights of an observation of the keypoint's own landmark. `spread`: `basic_frame::spread`. The standard
+/// deviation of the depth is unchanged, but the third residual also depends on the deviation of the pixel.
+inline void set_spread(optimize::pose_observation& o, const pixel_spread& spread) {
+  const double deviation = static_cast<double>(spread.deviation);
   o.information /= deviation * deviation;
   o.depth_weight = std::min(1.0, deviation);
+  o.smear = vec2(static_cast<double>(spread.smear_x), static_cast<double>(spread.smear_y)) / deviation;
 }
 
 /// Returns the observation of the landmark of keypoint `i`, at `position` (world, metres).
@@ -42,7 +43,7 @@ template <camera::camera_model Camera, feature_descriptor D>
 [[nodiscard]] optimize::pose_observation landmark_observation(const camera_rig<Camera>& rig, const basic_frame<D>& f,
                                                               std::size_t i, const vec3& position) {
   optimize::pose_observation o = make_observation(rig, f, i, position);
-  set_deviation(o, f.deviation(i));
+  set_spread(o, f.spread(i));
   return o;
 }
 

@@ -67,7 +67,7 @@ struct bundle_snapshot {
       const std::uint32_t pose = index_of(seen.keyframe);
       if (pose == no_id) continue;
       const auto at = landmark_observation<Camera, D>(rig, m.at(seen.keyframe), seen.feature, l.position);
-      observations.push_back({pose, point, at.pixel, at.right, at.information, at.depth_weight});
+      observations.push_back({pose, point, at.pixel, at.right, at.information, at.depth_weight, at.smear});
       sources.push_back(seen);
     }
   }
@@ -182,6 +182,7 @@ class bundle_solver {
       rough.pixel = o.pixel;
       rough.right = o.right;
       rough.information = o.information * o.depth_weight * o.depth_weight;
+      rough.smear = o.depth_weight * o.smear;
       const auto error = model_.residual(to.poses[o.pose].inverse() * to.points[o.point], rough);
       if (error && squared_norm(*error) * rough.information <= error_limit(rough.has_depth())) to.outliers[i] = 0;
     }

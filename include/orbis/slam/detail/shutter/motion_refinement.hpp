@@ -97,7 +97,7 @@ void find_row_observations(const basic_frame<D>& f, const basic_map<D>& m, const
     o.seen.pixel = {static_cast<double>(read.x), static_cast<double>(read.y)};
     if (read.depth > 0.0F) o.seen.right = rig.model.right(o.seen.pixel.x(), static_cast<double>(read.depth));
     o.seen.information = rig.scales.information(f.features.keypoints[i].octave);
-    set_deviation(o.seen, f.deviation(i));
+    set_spread(o.seen, f.spread(i));
     o.time = f.shutter.color_time(o.seen.pixel.y(), rig.camera().height());
   }
 }

@@ -62,7 +62,7 @@ class map_start {
     }
     enter_new_map(t);
     f.landmarks.assign(f.size(), no_id);  // these are from searches in other maps
-    f.deviations.clear();
+    f.spreads.clear();
     f.T_world_camera =
         c_.settings.find_initial_pose ? c_.settings.find_initial_pose() : c_.settings.initial_pose.value_or(se3{});
     if (start) add_first(*std::move(start), t);

@@ -75,7 +75,7 @@ class recovery {
     frame_type& f = t.frame;
     f.T_world_camera = aligned.at.T_world_camera;
     f.landmarks.assign(f.size(), no_id);
-    f.deviations.clear();
+    f.spreads.clear();
     refinement_.move_keypoints(f);
     c_.state = track_state::tracking;
     f.held_by_depth = true;

@@ -52,7 +52,7 @@ std::size_t refine_on_matches(basic_frame<D>& f, const search_list<D>& list, std
 }
 
 /// Refines the pose of `f` on its landmarks, and keeps the landmarks that agree with the result. Returns their number;
-/// 0 if the pose cannot be determined. @pre f.deviations is set
+/// 0 if the pose cannot be determined. @pre f.spreads is set
 template <feature_descriptor D, camera::camera_model Camera>
 std::size_t refine_on_landmarks(basic_frame<D>& f, const basic_map<D>& m, const camera_rig<Camera>& rig) {
   std::vector<optimize::pose_observation> observations;
@@ -74,7 +74,7 @@ std::size_t refine_on_landmarks(basic_frame<D>& f, const basic_map<D>& m, const 
   for (std::size_t k = 0; k != keypoints.size(); ++k) {
     if (outliers[k] == 0) continue;
     const std::size_t i = keypoints[k];
-    f.deviations[i] = std::max(1.0F, f.deviations[i]);
+    f.spreads[i].deviation = std::max(1.0F, f.spreads[i].deviation);
     if (agrees(rig, f, T_camera_world, i, observations[k].point))
       ++kept;
     else
