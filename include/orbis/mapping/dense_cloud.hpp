@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <optional>
 #include <ranges>
+#include <span>
 #include <type_traits>
 #include <utility>
 #include <vector>
