@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <orbis/camera/any.hpp>
+#include <orbis/eval/rpe.hpp>
 #include <orbis/io/recording.hpp>
 #include <orbis/io/synthetic.hpp>
 #include <orbis/optimize/alignment.hpp>
@@ -348,4 +349,20 @@ TEST_CASE("The kitchen is tracked without a lost frame") {
     truth.back().T_world_camera = f.T_world_camera;
   }
   CHECK(ate(slam.trajectory(), truth) < 0.06);
+}
+
+TEST_CASE("Depth in the pose lowers the error from frame to frame") {
+  ORBIS_NEEDS_DATA("fr1_xyz_220");
+  const auto recording = io::open_recording(test::data_dir() / "fr1_xyz_220").value();
+  const auto error = [&](bool depth) {
+    slam::options settings;
+    settings.shutter = {.color_read_out = 0.02, .depth_delay = -0.01};
+    settings.depth_term.enabled = settings.depth_term.recovers = depth;
+    test::slam_system slam{recording.camera().model, settings};
+    for (std::size_t i = 0; i != 80; ++i) CHECK(slam.track(recording.frame(i).value()).tracked());
+    return eval::rpe(slam.trajectory(), recording.ground_truth())->translation.rmse;
+  };
+  const double with = error(true), without = error(false);
+  CAPTURE(with, without);
+  CHECK(with < 0.98 * without);
 }
