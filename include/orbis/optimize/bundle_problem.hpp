@@ -24,7 +24,7 @@ struct bundle_observation {
   double right = std::numeric_limits<double>::quiet_NaN();  ///< see `pose_observation`; NaN if there is no depth
   double information = 1.0;                                 ///< 1 / sigma^2 of the pixel, in 1 / pixel^2
   double depth_weight = 1.0;                                ///< see `pose_observation`
-  vec2 smear = zeros<vec2>();                               ///< see `pose_observation`
+  vec2 smear = zeros<vec2>();                               ///< see `pose_observation`; for `reprojection` only
 };
 
 /// Manifold of a camera state: the type of the state and the effect of a step. `m.retract(p, d)` is the state to

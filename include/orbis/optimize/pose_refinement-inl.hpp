@@ -30,7 +30,7 @@ class pose_pieces {
   [[nodiscard]] static bool usable(const pose_observation& o) {
     constexpr double most = 1e100;
     const double size = std::abs(o.point.x()) + std::abs(o.point.y()) + std::abs(o.point.z()) + std::abs(o.pixel.x()) +
-                        std::abs(o.pixel.y()) + o.information;
+                        std::abs(o.pixel.y()) + std::abs(o.smear.x()) + std::abs(o.smear.y()) + o.information;
     return size < most && o.information > 0.0 && !(std::abs(o.right) >= most);
   }
 
@@ -63,7 +63,10 @@ class pose_pieces {
     const pose_observation nothing{.point = vec3(0.0, 0.0, 1.0), .information = 0.0};
     for (std::size_t i = 0; i != padded(count); ++i) {
       const bool use = i < count && usable(observations_[first + i]);
-      const pose_observation o = use ? without_smear(observations_[first + i]) : nothing;
+      pose_observation o = use ? observations_[first + i] : nothing;
+      const double of_right = o.depth_weight * o.smear.x();  // the third residual contains the error of the column
+      o = without_smear(o);
+      o.depth_weight /= std::sqrt(1.0 + of_right * of_right);
       lanes_.x[i] = o.point.x();
       lanes_.y[i] = o.point.y();
       lanes_.z[i] = o.point.z();

@@ -26,9 +26,9 @@ struct pose_observation {
   /// Weight of the third residual: sigma of the pixel divided by sigma of the right coordinate; finite and not
   /// negative.
   double depth_weight = 1.0;
-  /// Additional error of the pixel along a line, for example due to motion blur: the direction of the line, with the
-  /// standard deviation divided by sigma of the pixel as its length. The covariance of the pixel is `(I + s s^T) /
-  /// information`, and that of the depth is unchanged.
+  /// Additional error of the pixel along a line, finite, for example due to motion blur: the direction of the line,
+  /// with the standard deviation divided by sigma of the pixel as its length. The covariance of the pixel is `(I + s
+  /// s^T) / information`, and that of the depth is unchanged.
   vec2 smear = zeros<vec2>();
   [[nodiscard]] bool has_depth() const noexcept { return !std::isnan(right); }
 };
@@ -44,8 +44,9 @@ namespace detail {
 
 }  // namespace detail
 
-/// Returns a `pose_observation` or `bundle_observation` with its largest standard deviation in all directions, for
-/// methods that ignore the smear.
+/// Returns a `pose_observation` or `bundle_observation` with its largest standard deviation in all directions. The
+/// standard deviation of the depth is unchanged. For methods that ignore the smear, and whose depth residual does not
+/// depend on the pixel.
 template <class Observation>
 [[nodiscard]] Observation without_smear(Observation o) {
   const double largest = 1.0 + squared_norm(o.smear);
@@ -113,7 +114,8 @@ struct reprojection {
     return {inverse.rotation_matrix(), inverse.translation()};
   }
   [[nodiscard]] static bool is_usable(const observation& o) {
-    return o.information > 0.0 && std::isfinite(o.information) && all_finite(o.pixel) && !std::isinf(o.right);
+    return o.information > 0.0 && std::isfinite(o.information) && all_finite(o.pixel) && all_finite(o.smear) &&
+           !std::isinf(o.right);
   }
   [[nodiscard]] std::optional<vec3> residual(const view& v, const vec3& point, const observation& o) const {
     return residual_in_camera(v, v.rotation * point + v.translation, o);
