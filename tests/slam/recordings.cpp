@@ -283,6 +283,23 @@ TEST_CASE("Depth and few landmarks together hold a camera before bare walls that
   CHECK(held.ate < 0.03);
 }
 
+TEST_CASE("Depth in the pose lowers the error from frame to frame if the images are noisy") {
+  io::synthetic_options o{.frames = 80, .fps = 30.0, .seed = 3, .width = 320, .height = 240, .frames_around = 400};
+  o.sensor.colour_noise = 20.0;
+  const io::synthetic_recording frames{o};
+  const auto error = [&](bool depth) {
+    slam::options settings;
+    settings.depth_term.enabled = settings.depth_term.recovers = depth;
+    test::slam_system slam{frames.camera().model, settings};
+    for (std::size_t i = 0; i != frames.size(); ++i) slam.track(frames.frame(i).value());
+    CHECK(slam.counters().lost == 0);
+    return eval::rpe(slam.trajectory(), frames.ground_truth())->translation.rmse;
+  };
+  const double with = error(true), without = error(false);
+  CAPTURE(with, without);
+  CHECK(with < without);
+}
+
 TEST_CASE("A rolling shutter costs little where it is known, and much where it is not") {
   io::synthetic_options o{.frames = 120, .fps = 30.0, .seed = 3, .width = 320, .height = 240, .frames_around = 400};
   o.path.jitter = 5.0;

@@ -61,7 +61,6 @@ template <feature_descriptor D, class Camera>
   const std::size_t count = std::min(shared.size(), options.max_landmarks);
   for (std::size_t i = 0; i != count; ++i)
     s.add_landmark(m, m.landmark_at(shared[i * shared.size() / count]), rig, index_of);
-  for (optimize::bundle_observation& o : s.observations) o = optimize::without_smear(o);
   return s;
 }
 
@@ -119,13 +118,14 @@ template <camera::parametric_camera Camera>
   constexpr double patch_correlation = 2.5;
   const bool by_patches = std::any_of(problem.observations.begin(), problem.observations.end(),
                                       [](const auto& o) { return o.depth_weight < 1.0; });
+  auto observations = problem.observations;
+  for (optimize::bundle_observation& o : observations) o = optimize::without_smear(o);
   std::optional<optimize::self_calibrated<Camera>> found;
   while (!found) {
     auto poses = problem.poses;
     auto points = problem.points;
-    auto tried =
-        optimize::self_calibrate<Camera>(before, poses, points, problem.observations,
-                                         {.bf = bf, .free = free, .keeps_aspect = options.keeps_aspect}, callback);
+    auto tried = optimize::self_calibrate<Camera>(
+        before, poses, points, observations, {.bf = bf, .free = free, .keeps_aspect = options.keeps_aspect}, callback);
     if (!tried && tried.error().code != errc::degenerate) return fail(tried.error());
     if (tried && by_patches) tried->covariance *= patch_correlation * patch_correlation;
     const auto is_vague = [&](std::uint32_t group) {

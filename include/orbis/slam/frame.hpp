@@ -61,7 +61,7 @@ struct keypoint_as_read {
 /// Uncertainty of a keypoint's position, in pixels of its pyramid level: the covariance is `deviation^2 I + s s^T`,
 /// where s = (smear_x, smear_y).
 struct pixel_spread {
-  float deviation = 1.0F;                ///< standard deviation in all directions
+  float deviation = 1.0F;                ///< standard deviation in all directions, > 0
   float smear_x = 0.0F, smear_y = 0.0F;  ///< direction of the motion blur times the standard deviation along it
 };
 

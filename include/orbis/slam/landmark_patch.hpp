@@ -21,12 +21,14 @@ struct landmark_patch {
   using pixel_array = std::array<std::uint8_t, std::size_t{size} * size>;
 
   std::shared_ptr<const pixel_array> pixels;  ///< row by row; null: the landmark has no patch
-  vec3 across = zeros<vec3>();    ///< step from a pixel to the next one in its row, in the world frame, metres
-  vec3 down = zeros<vec3>();      ///< step from a row to the next one, in the world frame, metres
-  float corner_deviation = 1.0F;  ///< standard deviation of a corner's position along the motion blur, pixels
-  float coarseness = 1.0F;        ///< size of its pixels, in pixels of the level of the keypoint where it was taken
-  bool is_flat = true;            ///< false if depth shows more than one surface in it, which move differently
-  vec2 motion = zeros<vec2>();    ///< velocity of the landmark in the image, patch pixels per second
+  vec3 across = zeros<vec3>();  ///< step from a pixel to the next one in its row, in the world frame, metres
+  vec3 down = zeros<vec3>();    ///< step from a row to the next one, in the world frame, metres
+  /// Standard deviation of a corner's position along the motion blur, in pixels of the level of the keypoint where the
+  /// patch was taken.
+  float corner_deviation = 1.0F;
+  float coarseness = 1.0F;      ///< size of its pixels, in pixels of the level of the keypoint where it was taken
+  bool is_flat = true;          ///< false if depth shows several surfaces in the patch
+  vec2 motion = zeros<vec2>();  ///< velocity of the landmark in the image, patch pixels per second
 
   /// Moves the surface by a motion in the world frame.
   void move(const sim3& T_new_old) {

@@ -293,17 +293,21 @@ bool basic_map<D>::attach(landmark_id id, keyframe_id k, std::uint32_t feature) 
 }
 
 template <feature_descriptor D>
-void basic_map<D>::release(const observation& o) {
+void basic_map<D>::release(const landmark_type& l, const observation& o) {
   keyframe_type& k = content_.keyframes[o.keyframe];
   k.landmarks[o.feature] = no_id;
-  if (!k.spreads.empty()) k.spreads[o.feature].deviation = std::max(1.0F, k.spreads[o.feature].deviation);
+  if (k.spreads.empty()) return;
+  // The patch no longer defines where the keypoint is, which is a corner again.
+  const bool defines = l.patch.pixels != nullptr && l.created == o.keyframe;
+  float& deviation = k.spreads[o.feature].deviation;
+  deviation = std::max(deviation, defines ? l.patch.corner_deviation : 1.0F);
 }
 
 template <feature_descriptor D>
 void basic_map<D>::detach(landmark_id id, keyframe_id k) {
   landmark_type& l = content_.landmarks[id];
   const auto at = l.observations.begin() + (l.seen_by(k) - l.observations.data());
-  release(*at);
+  release(l, *at);
   l.observations.erase(at);
   l.has_current_descriptor = false;
   if (l.observations.empty()) content_.landmarks.erase(id);
@@ -314,7 +318,7 @@ auto basic_map<D>::remove(landmark_id id, landmark_id replacement) -> landmark_t
   landmark_type l = std::move(content_.landmarks[id]);
   content_.landmarks.erase(id, replacement);
   for (auto o = l.observations.begin(); o != l.observations.end(); ++o) {
-    release(*o);
+    release(l, *o);
     for (auto other = std::next(o); other != l.observations.end(); ++other)
       covisibility_.unshare(o->keyframe, other->keyframe);
   }

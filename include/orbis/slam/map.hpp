@@ -219,7 +219,7 @@ class basic_map {
   bool attach(landmark_id id, keyframe_id k, std::uint32_t feature);
   /// Clears the landmark of a keypoint, and raises the keypoint's deviation to at least 1: a smaller one came from the
   /// alignment of the landmark's patch.
-  void release(const observation& o);
+  void release(const landmark_type& l, const observation& o);
   /// Removes both sides of an observation, without updating the covisibility graph. @pre the observation exists
   void detach(landmark_id id, keyframe_id k);
   landmark_type remove(landmark_id id, landmark_id replacement);

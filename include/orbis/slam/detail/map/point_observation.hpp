@@ -29,8 +29,9 @@ template <camera::camera_model Camera, feature_descriptor D>
   return o;
 }
 
-/// Sets the weights of an observation of the keypoint's own landmark. `spread`: `basic_frame::spread`. The standard
-/// deviation of the depth is unchanged, but the third residual also depends on the deviation of the pixel.
+/// Sets the weights of an observation of the keypoint's own landmark. `spread`: `basic_frame::spread`. Up to a
+/// deviation of 1, the standard deviation of the depth is unchanged, but the third residual also depends on that of the
+/// pixel.
 inline void set_spread(optimize::pose_observation& o, const pixel_spread& spread) {
   const double deviation = static_cast<double>(spread.deviation);
   o.information /= deviation * deviation;
@@ -53,11 +54,13 @@ template <camera::camera_model Camera, feature_descriptor D>
 }
 
 /// Returns true if keypoint `i` of a frame agrees with `point` (world, metres): the squared reprojection error, divided
-/// by its variance, is at most `error_limit`.
+/// by its variance, is at most `error_limit`. The standard deviation of the keypoint is one pixel of its level, and
+/// larger along its smear.
 template <camera::camera_model Camera, feature_descriptor D>
 [[nodiscard]] bool agrees(const camera_rig<Camera>& rig, const basic_frame<D>& f, const se3& T_camera_world,
                           std::size_t i, const vec3& point) {
-  const optimize::pose_observation o = make_observation(rig, f, i, point);
+  optimize::pose_observation o = make_observation(rig, f, i, point);
+  o.smear = vec2(static_cast<double>(f.spread(i).smear_x), static_cast<double>(f.spread(i).smear_y));
   const auto error = rig.model.residual(T_camera_world * point, o);
   return error && squared_norm(*error) * o.information <= error_limit(o.has_depth());
 }

@@ -25,11 +25,14 @@ class exposure_estimation {
     for (std::size_t i = 0; i != count; ++i) sums_[i] = memory * sums_[i] + correlations[i];
   }
 
+  /// Returns true if there is enough evidence for an estimate.
+  [[nodiscard]] bool has_enough() const noexcept { return weight_ >= enough; }
+
   /// Returns the estimate, seconds: the best candidate, refined by a parabola; 0 until there is enough evidence.
   [[nodiscard]] double exposure() const noexcept {
-    constexpr double enough = 100.0, clear = 0.002;  // patches; gain of the mean correlation
+    constexpr double clear = 0.002;  // gain of the mean correlation
     const auto best = static_cast<std::size_t>(std::max_element(sums_.begin(), sums_.end()) - sums_.begin());
-    if (weight_ < enough || sums_[best] - sums_[0] < clear * weight_) return 0.0;
+    if (!has_enough() || sums_[best] - sums_[0] < clear * weight_) return 0.0;
     if (best + 1 == count) return candidate(best);
     const double before = sums_[best - 1] - sums_[best], after = sums_[best + 1] - sums_[best];
     const double curvature = before + after;
@@ -37,6 +40,8 @@ class exposure_estimation {
   }
 
  private:
+  static constexpr double enough = 300.0;  // patches, of several frames
+
   std::array<double, count> sums_{};
   double weight_ = 0.0;
 };

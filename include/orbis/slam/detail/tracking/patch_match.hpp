@@ -33,15 +33,16 @@ namespace orbis::slam::detail {
 /// A filter for motion blur: the mean along a line centred on a pixel, as weights of the surrounding pixels.
 class line_kernel {
  public:
-  static constexpr int reach = 6;  ///< pixels; longer lines are shortened
+  static constexpr int reach = 6;                 ///< pixels from the middle
+  static constexpr double longest = 2.0 * reach;  ///< pixels; longer lines are shortened
 
   explicit line_kernel(vec2 line) {
-    const double longest = std::max(std::abs(line.x()), std::abs(line.y()));
+    const double extent = std::max(std::abs(line.x()), std::abs(line.y()));
     if (!(norm(line) >= 0.1 && norm(line) < 1e6)) {  // also true for NaN
       weights_[count_++] = {0, 0, 1.0F};
       return;
     }
-    if (longest > 2.0 * reach) line = (2.0 * reach / longest) * line;
+    if (extent > longest) line = (longest / extent) * line;
     const int steps = 2 * static_cast<int>(std::ceil(norm(line))) + 1;
     std::array<float, std::size_t{side} * side> dense{};
     for (int k = 0; k != steps; ++k) {

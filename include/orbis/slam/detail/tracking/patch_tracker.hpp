@@ -68,8 +68,8 @@ class patch_tracker {
   [[nodiscard]] double exposure() const noexcept { return options_.exposure.value_or(estimation_.exposure()); }
 
   /// Moves the keypoints that observe landmarks to the positions of their patches in the image, and sets `f.spreads`.
-  /// `twist`: the twist of the camera in its own frame, per second. Returns false, and leaves `f.spreads` empty, if no
-  /// patch is found. `estimates`: true if the frame contributes to the estimate of the exposure time. O(features).
+  /// `twist`: the twist of the camera in its own frame, per second. Returns false if no patch is found. `estimates`:
+  /// true if the frame contributes to the estimate of the exposure time. O(features).
   /// @pre is_ready()
   [[nodiscard]] bool align(basic_frame<D>& f, const basic_map<D>& m, const vec6& twist, bool estimates = true) {
     const double seconds = exposure();
@@ -87,16 +87,16 @@ class patch_tracker {
       const basic_landmark<D>& l = m.landmark_at(f.landmarks[i]);
       const auto view = predict_view(f, i, l, T_camera_world, motion);
       if (!view) continue;
-      const std::size_t every = seconds == 0.0 ? 4 : 32;  // only one patch in this number is compared, to save time
+      const std::size_t every = estimation_.has_enough() ? 32 : 4;  // compares one patch in this number, to save time
       if (estimates && !options_.exposure && shows_exposure(l.patch, *view) && moving++ % every == 0)
         compare_exposures(l.patch, *view);
       const auto found = match(l.patch, *view, seconds);
       if (!found || found->correlation < options_.min_correlation) continue;
       const vec2 shift = found->shift.x() * view->across + found->shift.y() * view->down;
       if (!move_keypoint(f, i, view->pixel + shift, view->delay)) continue;
-      f.spreads[i] = patch_spread(l.patch, *view, seconds * motion);
+      f.spreads[i] = patch_spread(l.patch, *view, scale);
     }
-    if (moved_.empty()) f.spreads.clear();
+    if (moved_.empty() && seconds == 0.0) f.spreads.clear();  // all are the default
     f.grid.assign(f.features.keypoints);
     return !moved_.empty();
   }
@@ -123,7 +123,7 @@ class patch_tracker {
       if (f.landmarks[i] == no_id) continue;
       const basic_landmark<D>& l = m.landmark_at(f.landmarks[i]);
       const auto at = l.patch.is_flat ? rig_.camera().project(T_camera_world * l.position) : std::nullopt;
-      if (at) errors_.push_back(norm(*at - f.pixel(i)) / (expected_scale(f, i, l.patch)));
+      if (at) errors_.push_back(error_size(*at - f.pixel(i), f.spread(i)) / expected_scale(f, i, l.patch));
     }
     if (errors_.size() < enough) return;
     const auto middle = errors_.begin() + static_cast<std::ptrdiff_t>(errors_.size() / 2);
@@ -143,7 +143,8 @@ class patch_tracker {
       auto patch = patch_at(f, i, T_camera_world * m.landmark_at(l).position, twist);
       if (!patch) continue;
       m.set_patch(l, *std::move(patch));
-      m.set_spread(id, i, make_spread(deviation_, zeros<vec2>()));
+      const double pixel = static_cast<double>(m.landmark_at(l).patch.coarseness);
+      m.set_spread(id, i, make_spread(pixel * deviation_, zeros<vec2>()));
     }
   }
 
@@ -157,7 +158,7 @@ class patch_tracker {
       const auto& l = m.landmark_at(k.landmarks[i]);
       const auto level = (*image_.levels)[static_cast<std::size_t>(k.features.keypoints[i].octave)];
       landmark_patch patch = l.patch;
-      set_motion(patch, T_camera_world * l.position, pixel_size(level), twist);
+      set_motion(patch, T_camera_world * l.position, static_cast<double>(patch.coarseness) * pixel_size(level), twist);
       m.set_patch(l.id, std::move(patch));
     }
   }
@@ -196,16 +197,31 @@ class patch_tracker {
   }
   /// Returns the smear of a corner that may be found anywhere on its streak.
   [[nodiscard]] static vec2 corner_smear(const vec2& streak) { return streak / std::sqrt(12.0); }
-  /// Returns the uncertainty of the position found for a patch. `streak`: motion of the landmark during the exposure,
-  /// pixels of the image. The constants were measured in simulated rooms: along the streak, the error of a flat patch
-  /// is 0.1 of its pixels if the longer of both streaks has 8 pixels, and increases rapidly with the length, as little
-  /// texture is left; patches with several surfaces have three times the error.
-  [[nodiscard]] pixel_spread patch_spread(const landmark_patch& patch, const patch_view& v, const vec2& streak) const {
+  /// Returns the uncertainty of the position found for a patch. `scale`: size of a pixel of the keypoint's level,
+  /// pixels of the image. The constants were measured in simulated rooms: along the longer streak of patch and image,
+  /// the error of a flat patch is 0.1 of its pixels if that streak has 8 pixels, and increases rapidly with the length,
+  /// as little texture is left; patches with several surfaces have three times the error.
+  [[nodiscard]] pixel_spread patch_spread(const landmark_patch& patch, const patch_view& v, double scale) const {
     constexpr double error = 0.1, length = 8.0, power = 2.5, uneven = 3.0;
-    const double pixel = static_cast<double>(patch.coarseness) * (patch.is_flat ? 1.0 : uneven);
-    const double longer = exposure() * std::max(norm(patch.motion), norm(v.motion)), size = norm(streak);
-    const double along = error * std::pow(longer / length, power);
-    return make_spread(pixel * deviation_, size > 0.0 ? vec2(pixel * along / size * streak) : vec2(zeros<vec2>()));
+    const double times = patch.is_flat ? 1.0 : uneven;
+    const vec2& motion = norm(patch.motion) > norm(v.motion) ? patch.motion : v.motion;
+    const double streak = exposure() * norm(motion);
+    vec2 smear = zeros<vec2>();
+    if (streak > 0.0) {
+      const double along = error * std::pow(std::min(streak, line_kernel::longest) / length, power);
+      const vec2 on_patch = along / norm(motion) * motion;
+      smear = times / scale * vec2(on_patch.x() * v.across + on_patch.y() * v.down);
+    }
+    return make_spread(times * static_cast<double>(patch.coarseness) * deviation_, smear);
+  }
+  /// Returns the size of a position error; its median is that of an error with equal deviations in both directions.
+  /// Along the smear, the error is ignored.
+  [[nodiscard]] static double error_size(const vec2& error, const pixel_spread& spread) {
+    constexpr double by_direction = 1.1774 / 0.6745;  // medians of the Rayleigh and the half-normal distribution
+    const vec2 smear(static_cast<double>(spread.smear_x), static_cast<double>(spread.smear_y));
+    const double size = norm(smear);
+    if (!(size > 0.0)) return norm(error);
+    return by_direction * std::abs(error.x() * smear.y() - error.y() * smear.x()) / size;
   }
   /// Returns the size of the pixels of a patch that keypoint `i` observes, expected from the keypoint's level, in
   /// pixels of the image.
@@ -326,7 +342,7 @@ class patch_tracker {
   void set_motion(landmark_patch& patch, const vec3& point, const vec2& size, const vec6& twist) const {
     const vec2 motion = image_motion(point, twist);
     patch.motion = {motion.x() / size.x(), motion.y() / size.y()};
-    const vec2 smear = corner_smear(exposure() * patch.motion);
+    const vec2 smear = corner_smear(exposure() * static_cast<double>(patch.coarseness) * patch.motion);
     patch.corner_deviation = static_cast<float>(std::sqrt(1.0 + squared_norm(smear)));
   }
   /// Returns true if a patch at `pixel` (pixels of the image) is inside a pyramid level.
@@ -345,24 +361,19 @@ class patch_tracker {
       ++octave;
     return octave;
   }
-  /// Returns true if depth around `pixel` agrees with the plane through `point` (camera frame, metres) with the given
-  /// steps per pixel of a patch, whose size is `size` pixels of the image.
+  /// Returns true if depth around `pixel`, where it is known, agrees with the plane through `point` (camera frame,
+  /// metres) with the given steps per pixel of a patch, whose size is `size` pixels of the image.
   [[nodiscard]] bool is_flat(const vec2& pixel, const vec2& size, const vec3& point, const vec3& across,
                              const vec3& down) const {
     constexpr double arm = 5.0, tolerance = 0.06;  // pixels of the patch; fraction of the depth
-    constexpr int most_unknown = 2;
     if (!image_.depth_at) return true;
-    int unknown = 0;
     for (const double v : {-arm, 0.0, arm})
       for (const double u : {-arm, 0.0, arm}) {
         const double z = (point + u * across + v * down).z();
         const double measured = image_.depth_at(vec2(pixel.x() + u * size.x(), pixel.y() + v * size.y()));
-        if (!(measured > 0.0))
-          ++unknown;
-        else if (std::abs(measured - z) > tolerance * z)
-          return false;
+        if (measured > 0.0 && std::abs(measured - z) > tolerance * z) return false;
       }
-    return unknown <= most_unknown;
+    return true;
   }
   /// Returns the patch around keypoint `i`, which observes `point` (camera frame, metres); empty near the border.
   [[nodiscard]] std::optional<landmark_patch> patch_at(const basic_frame<D>& f, std::size_t i, const vec3& point,
@@ -380,9 +391,9 @@ class patch_tracker {
     landmark_patch patch;
     patch.across = f.T_world_camera.rotation() * *across;
     patch.down = f.T_world_camera.rotation() * *down;
-    set_motion(patch, point, size, twist);
     patch.coarseness =
         static_cast<float>(rig_.scales.scale(static_cast<int>(chosen)) / rig_.scales.scale(static_cast<int>(octave)));
+    set_motion(patch, point, size, twist);
     patch.is_flat = is_flat(pixel, size, point, *across, *down);
     constexpr double c = landmark_patch::centre;
     auto pixels = std::make_shared<landmark_patch::pixel_array>();
