@@ -23,8 +23,9 @@ struct keyframe_options {
   double interval = 0.3;  ///< seconds since the last keyframe after which motion alone triggers a new one
   /// Translation since the last keyframe that counts as motion, metres; without depth, in units of the median depth.
   double moved = 0.06;
-  double turned = 0.06;             ///< rotation since the last keyframe that counts as motion, radians
-  double max_turned = 0.15;         ///< rotation since the last keyframe that triggers a new one at once, radians
+  double turned = 0.06;  ///< rotation since the last keyframe that counts as motion, radians
+  /// Rotation that triggers a new keyframe at once, relative to the last keyframe and to the reference, radians.
+  double max_turned = 0.15;
   double inlier_ratio = 0.75;       ///< a frame with a smaller share of the reference's landmarks becomes a keyframe
   double inlier_ratio_start = 0.4;  ///< `inlier_ratio` while the map has only one keyframe
   std::size_t min_inliers = 15;     ///< no keyframe is created with this number of inliers or fewer

@@ -51,12 +51,13 @@ TEST_CASE("Each reason for a keyframe is enough, none is, if few landmarks are t
   moved.inliers = 15;
   CHECK_FALSE(is_keyframe_due(moved, o));
 
-  auto turned = quiet;
-  turned.turned = 0.14;
-  CHECK_FALSE(is_keyframe_due(turned, o));  // too soon
-  turned.turned = 0.16;
-  CHECK(is_keyframe_due(turned, o));
-  CHECK_FALSE(is_keyframe_due(turned, slam::monocular_options().keyframes));  // a rotation gives no parallax
+  auto away = quiet;
+  away.turned = 0.5;
+  away.away = 0.14;
+  CHECK_FALSE(is_keyframe_due(away, o));  // an older keyframe shows the view
+  away.away = 0.16;
+  CHECK(is_keyframe_due(away, o));
+  CHECK_FALSE(is_keyframe_due(away, slam::monocular_options().keyframes));  // a rotation gives no parallax
 }
 
 TEST_CASE("The evidence is counted from the map and the frame, which stay as they are") {

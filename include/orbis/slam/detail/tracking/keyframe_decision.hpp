@@ -17,6 +17,7 @@ struct keyframe_evidence {
   double since = 0.0;   ///< seconds since the last keyframe
   double moved = 0.0;   ///< translation since the last keyframe, metres (relative to scene depth if scale is unknown)
   double turned = 0.0;  ///< rotation since the last keyframe, radians
+  double away = 0.0;    ///< rotation relative to the last keyframe or to the reference, whichever is nearer, radians
   std::size_t inliers = 0;          ///< number of landmarks tracked in the frame
   std::size_t reference = 0;        ///< number of landmarks of the reference keyframe that other keyframes also observe
   std::size_t close_tracked = 0;    ///< number of close keypoints that observe a landmark
@@ -38,6 +39,8 @@ template <feature_descriptor D>
     e.moved = depth > 0.0 ? e.moved / depth : 0.0;
   }
   e.turned = motion.rotation().angle();
+  const so3 from_reference = m.at(reference).T_world_camera.rotation().inverse() * f.T_world_camera.rotation();
+  e.away = std::min(e.turned, from_reference.angle());
   e.inliers = inliers;
   e.keyframes = m.keyframes().size();
   // Without depth, a landmark is created from two observations; only a third one confirms it.
@@ -60,7 +63,7 @@ template <feature_descriptor D>
   const bool view_changed = static_cast<double>(e.inliers) < ratio * static_cast<double>(e.reference);
   const bool needs_close = e.close_tracked < o.close_tracked && e.close_untracked > o.close_untracked;
   const bool has_moved = e.since >= o.interval && (e.moved >= o.moved || e.turned >= o.turned);
-  return view_changed || needs_close || has_moved || e.turned >= o.max_turned;
+  return view_changed || needs_close || has_moved || e.away >= o.max_turned;
 }
 
 }  // namespace orbis::slam::detail
