@@ -25,9 +25,11 @@ TEST_CASE("The exposure is that of the best correlation, once there is evidence"
   for (const double exposure : {0.006, 0.0139, 0.025, 0.03}) {
     exposure_estimation e;
     CHECK(e.exposure() == 0.0);
-    for (int k = 0; k != 90; ++k) e.add(around(exposure));
+    for (int k = 0; k != 340; ++k) e.add(around(exposure));
+    CHECK_FALSE(e.has_enough());
     CHECK(e.exposure() == 0.0);
-    for (int k = 0; k != 90; ++k) e.add(around(exposure));
+    for (int k = 0; k != 40; ++k) e.add(around(exposure));
+    CHECK(e.has_enough());
     CHECK(std::abs(e.exposure() - exposure) < 1e-4);
   }
 }
