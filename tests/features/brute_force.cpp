@@ -17,14 +17,7 @@ using namespace orbis::features;
 namespace {
 
 using descriptor = binary_descriptor<256>;
-
-std::vector<descriptor> random_descriptors(std::size_t count, std::uint64_t seed) {
-  random_bits random{seed};
-  std::vector<descriptor> descriptors(count);
-  for (descriptor& d : descriptors)
-    for (auto& word : d.words) word = random();
-  return descriptors;
-}
+using test::random_descriptors;
 
 }  // namespace
 

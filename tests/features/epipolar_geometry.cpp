@@ -19,13 +19,7 @@ using namespace orbis::features;
 
 namespace {
 
-const mat3 K1 = (mat3{} << 500.0, 0.0, 320.0, 0.0, 510.0, 240.0, 0.0, 0.0, 1.0).finished();
-const mat3 K2 = (mat3{} << 450.0, 0.0, 310.0, 0.0, 455.0, 250.0, 0.0, 0.0, 1.0).finished();
-/// The second camera looks sideways at what the first sees, or goes straight ahead.
-se3 sideways() { return {so3::exp(vec3{0.05, -0.2, 0.1}), vec3{0.4, 0.05, 0.1}}; }
-se3 ahead() { return {so3{}, vec3{0.02, 0.01, -0.5}}; }
-
-vec3 pixel(const mat3& K, const vec3& p) { return K * p / p.z(); }
+using test::ahead, test::K1, test::K2, test::pixel, test::sideways;
 
 }  // namespace
 

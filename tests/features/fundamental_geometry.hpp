@@ -44,4 +44,12 @@ class fundamental_geometry {
 };
 static_assert(features::epipolar_geometry<fundamental_geometry>);
 
+/// Intrinsic matrices of two cameras, pixels.
+inline const mat3 K1 = (mat3{} << 500.0, 0.0, 320.0, 0.0, 510.0, 240.0, 0.0, 0.0, 1.0).finished();
+inline const mat3 K2 = (mat3{} << 450.0, 0.0, 310.0, 0.0, 455.0, 250.0, 0.0, 0.0, 1.0).finished();
+/// Poses of the second camera: it looks sideways at what the first sees, or goes straight ahead.
+inline se3 sideways() { return {so3::exp(vec3{0.05, -0.2, 0.1}), vec3{0.4, 0.05, 0.1}}; }
+inline se3 ahead() { return {so3{}, vec3{0.02, 0.01, -0.5}}; }
+inline vec3 pixel(const mat3& K, const vec3& p) { return K * p / p.z(); }
+
 }  // namespace orbis::test

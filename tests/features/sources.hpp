@@ -13,6 +13,14 @@
 
 namespace orbis::test {
 
+inline std::vector<features::binary_descriptor<256>> random_descriptors(std::size_t count, std::uint64_t seed) {
+  random_bits random{seed};
+  std::vector<features::binary_descriptor<256>> descriptors(count);
+  for (features::binary_descriptor<256>& d : descriptors)
+    for (auto& word : d.words) word = random();
+  return descriptors;
+}
+
 /// Few random bits: many ties.
 inline features::features random_features(std::size_t count, std::uint64_t seed) {
   random_bits random{seed};

@@ -10,6 +10,7 @@
 #include <orbis/features/matcher.hpp>
 #include <orbis/features/stages.hpp>
 
+#include "features/sources.hpp"
 #include "support/catch.hpp"
 
 using namespace orbis;
@@ -18,14 +19,7 @@ using namespace orbis::features;
 namespace {
 
 using descriptor = binary_descriptor<256>;
-
-std::vector<descriptor> random_descriptors(std::size_t count, std::uint64_t seed) {
-  random_bits random{seed};
-  std::vector<descriptor> descriptors(count);
-  for (descriptor& d : descriptors)
-    for (auto& word : d.words) word = random();
-  return descriptors;
-}
+using test::random_descriptors;
 
 }  // namespace
 
