@@ -11,28 +11,16 @@
 #include <orbis/core/random.hpp>
 
 #include "cloud/clouds.hpp"
+#include "cloud/room_outliers.hpp"
 #include "cloud/views.hpp"
 #include "support/catch.hpp"
 
 using orbis::cloud::filter_automatically;
 using orbis::cloud::filter_mode;
 using orbis::cloud::threshold_source;
+using orbis::test::add_uniform, orbis::test::has_step;
 
 namespace {
-
-/// Uniform points in the box of a room seen by `room_cloud`.
-void add_uniform(orbis::test::points& cloud, std::size_t n, std::uint64_t seed) {
-  orbis::random_bits random{seed};
-  for (std::size_t i = 0; i != n; ++i) {
-    const double x = random.uniform(-1.4, 1.8);
-    const double y = random.uniform(-1.1, 1.1);
-    cloud.emplace_back(orbis::vec3{x, y, random.uniform(0.4, 3.3)}.cast<float>());
-  }
-}
-
-bool has_step(const orbis::cloud::filter_chain& chain, filter_mode mode) {
-  return std::any_of(chain.begin(), chain.end(), [&](const auto& step) { return step_mode(step) == mode; });
-}
 
 /// Checks that each step of the chain has a share of removed points in the evidence, and each share a step.
 void check_shares(const orbis::cloud::filter_choice& choice) {

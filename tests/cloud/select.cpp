@@ -15,6 +15,7 @@
 #include <orbis/cloud/voxel_grid.hpp>
 
 #include "cloud/clouds.hpp"
+#include "cloud/room_outliers.hpp"
 #include "cloud/views.hpp"
 #include "support/catch.hpp"
 
@@ -22,6 +23,7 @@ using orbis::cloud::choice_status;
 using orbis::cloud::filter_automatically;
 using orbis::cloud::filter_mode;
 using orbis::cloud::threshold_source;
+using orbis::test::add_uniform, orbis::test::has_step;
 
 namespace {
 
@@ -38,20 +40,6 @@ score score_of(const std::vector<std::uint32_t>& inliers, std::size_t points, st
   const std::size_t kept_bad = inliers.size() - kept_good;
   return {outliers == 0 ? 1.0 : 1.0 - static_cast<double>(kept_bad) / static_cast<double>(outliers),
           1.0 - static_cast<double>(kept_good) / static_cast<double>(good)};
-}
-
-/// Uniform points in the box of a room seen by `room_cloud`.
-void add_uniform(orbis::test::points& cloud, std::size_t n, std::uint64_t seed) {
-  orbis::random_bits random{seed};
-  for (std::size_t i = 0; i != n; ++i) {
-    const double x = random.uniform(-1.4, 1.8);
-    const double y = random.uniform(-1.1, 1.1);
-    cloud.emplace_back(orbis::vec3{x, y, random.uniform(0.4, 3.3)}.cast<float>());
-  }
-}
-
-bool has_step(const orbis::cloud::filter_chain& chain, filter_mode mode) {
-  return std::any_of(chain.begin(), chain.end(), [&](const auto& step) { return step_mode(step) == mode; });
 }
 
 std::vector<double> thresholds(const orbis::cloud::filter_choice& choice) {
