@@ -108,7 +108,7 @@ TEST_CASE("The depth of a keypoint is read where the camera sees the same point 
   slam::detail::keep_as_read(f);
   vec6 moving = vec6::Zero();
   moving[0] = 2.0;
-  slam::follow_rows(rig, {{.depth_delay = 0.02}, moving}, f, view);
+  slam::follow_rows(rig, {{.depth_delay = 0.02}, moving}, f.as_read, view);
   for (std::size_t i = 0; i != 3; ++i) {
     CHECK(f.as_read[i].stored_depth == f.depth[i]);
     const double shift = 35.0 * 0.04 / static_cast<double>(f.depth[i]);  // pixels to the left
@@ -116,7 +116,7 @@ TEST_CASE("The depth of a keypoint is read where the camera sees the same point 
   }
   // With rows of both images at one time there is nothing to follow.
   slam::detail::keep_as_read(f);
-  slam::follow_rows(rig, {{.color_read_out = 0.03, .depth_read_out = 0.03}, moving}, f, view);
+  slam::follow_rows(rig, {{.color_read_out = 0.03, .depth_read_out = 0.03}, moving}, f.as_read, view);
   for (std::size_t i = 0; i != 3; ++i) CHECK(f.as_read[i].depth == f.depth[i]);
 }
 
@@ -132,7 +132,7 @@ TEST_CASE("Depth that may belong to another surface later is not used") {
   slam::detail::keep_as_read(f);
   vec6 moving = vec6::Zero();
   moving[0] = 5.0;
-  slam::follow_rows(rig, {{.depth_delay = 0.03}, moving}, f, view);
+  slam::follow_rows(rig, {{.depth_delay = 0.03}, moving}, f.as_read, view);
   CHECK(f.as_read[1].depth == 0.0F);
   CHECK(f.as_read[1].stored_depth == 2.0F);
   CHECK(f.as_read[2].depth == 2.0F);

@@ -13,8 +13,10 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -41,6 +43,9 @@ struct frame_motion {
   camera::shutter shutter{};   ///< includes this frame's depth image delay
   vec6 twist = zeros<vec6>();  ///< twist of the camera in its own frame, per second, translation first
 };
+
+/// Sets the depths of keypoints as read by a rolling shutter, given the motion.
+using row_reader = std::function<void(std::span<keypoint_as_read>, const frame_motion&)>;
 
 /// An extractor that also accepts grey images.
 template <class E>
@@ -135,12 +140,13 @@ template <camera::camera_model Camera, feature_extractor Extractor, camera::dept
   return measure_rgbd(rig, extract, color, depth, memory);
 }
 
-/// Sets `depth` of each keypoint in `f.as_read` to the depth at the time when its row of the colour image was read. The
+/// Sets `depth` of each keypoint to the depth at the time when its row of the colour image was read. The
 /// depth is that of the pixel at which the moving camera sees the same point in the depth image. @pre all images have
 /// the size of the camera
-template <camera::camera_model Camera, feature_descriptor D, camera::depth_source Depth>
-void follow_rows(const camera_rig<Camera>& rig, const frame_motion& m, basic_frame<D>& f, const Depth& depth) {
-  for (keypoint_as_read& k : f.as_read) {
+template <camera::camera_model Camera, camera::depth_source Depth>
+void follow_rows(const camera_rig<Camera>& rig, const frame_motion& m, std::span<keypoint_as_read> keypoints,
+                 const Depth& depth) {
+  for (keypoint_as_read& k : keypoints) {
     const double v = static_cast<double>(k.y);
     const double later = m.shutter.depth_time(v, depth.height()) - m.shutter.color_time(v, depth.height());
     if (later == 0.0 || !(k.stored_depth > 0.0F)) continue;

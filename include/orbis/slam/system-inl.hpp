@@ -4,6 +4,8 @@
 #pragma once
 
 #include <chrono>
+#include <memory>
+#include <span>
 #include <string>
 
 #include <orbis/features/descriptor.hpp>
@@ -77,9 +79,18 @@ track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const rgb8> c
       return detail::usable_depth(shared_.rig, depth, static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
     };
   front_end_->patches().set_image(std::move(pixels));
-  return track_frame(
-      timestamp, std::move(f),
-      [&](frame_type& seen, const frame_motion& m) { follow_rows(shared_.rig, m, seen, depth); }, clock);
+  row_reader read = [&](std::span<keypoint_as_read> seen, const frame_motion& m) {
+    follow_rows(shared_.rig, m, seen, depth);
+  };
+  if (options_.estimates_shutter) {  // the image is read again when the next frame has been tracked
+    const auto kept = std::make_shared<image<float>>(depth.width(), depth.height());
+    for (int y = 0; y != depth.height(); ++y)
+      for (int x = 0; x != depth.width(); ++x) (*kept)(x, y) = depth(x, y);
+    read = [this, kept](std::span<keypoint_as_read> seen, const frame_motion& m) {
+      follow_rows(shared_.rig, m, seen, camera::depth_view<float>{kept->view()});
+    };
+  }
+  return track_frame(timestamp, std::move(f), read, clock);
 }
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
@@ -126,7 +137,7 @@ track_result ORBIS_SLAM_SYSTEM::track(double timestamp,
 }
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
-track_result ORBIS_SLAM_SYSTEM::track_frame(double timestamp, frame_type f, const row_follower& follow,
+track_result ORBIS_SLAM_SYSTEM::track_frame(double timestamp, frame_type f, const row_reader& follow,
                                             detail::stopwatch& clock) {
   track_result result;
   f.scale_is_known = shared_.rig.scale_is_known;
@@ -142,7 +153,7 @@ track_result ORBIS_SLAM_SYSTEM::track_frame(double timestamp, frame_type f, cons
         .maps = shared_.atlas,
         .is_frozen = localization_only_,
         .has_room = [&] { return !back_end_->is_full(); },
-        .read_rows = follow ? follow : [](frame_type&, const frame_motion&) {},
+        .read_rows = follow ? follow : [](std::span<keypoint_as_read>, const frame_motion&) {},
         .find_similar =
             [&](const auto& features, std::size_t count) {
               return shared_.similar(shared_.places.describe(features), count, [](map_keyframe) { return false; });

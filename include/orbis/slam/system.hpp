@@ -207,7 +207,6 @@ class system {
   using front_end = detail::front_end<Camera, descriptor_type, Matchers>;
   using back_end = detail::back_end<Camera, descriptor_type, Places>;
   /// Corrects the measurements for the row times of a rolling shutter, once the motion is known.
-  using row_follower = std::function<void(frame_type&, const frame_motion&)>;
 
   /// Returns true if the images have the size of the camera and the timestamp is finite.
   template <class... Images>
@@ -216,7 +215,7 @@ class system {
            ((images.width() == camera().width() && images.height() == camera().height()) && ...);
   }
   /// Tracks a measured frame; the frame has no features if its images could not be used.
-  track_result track_frame(double timestamp, frame_type f, const row_follower& follow, detail::stopwatch& clock);
+  track_result track_frame(double timestamp, frame_type f, const row_reader& follow, detail::stopwatch& clock);
   /// Passes a new keyframe to the callbacks and to the back end.
   void dispatch_keyframe(map_keyframe k);
   /// Fills in the result of a frame, and reports a change of state.

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -50,7 +51,7 @@ struct scene {
                 .maps = maps,
                 .is_frozen = is_frozen,
                 .has_room = [&] { return has_room; },
-                .read_rows = [](slam::frame&, const slam::frame_motion&) {},
+                .read_rows = [](std::span<slam::keypoint_as_read>, const slam::frame_motion&) {},
                 .find_similar = [&](const auto&, std::size_t) { return similar; },
                 .drop_map =
                     [&](slam::map_id m) {

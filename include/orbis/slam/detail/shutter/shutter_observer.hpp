@@ -30,45 +30,28 @@ class shutter_observer {
  public:
   [[nodiscard]] shutter_estimate estimate() const { return estimate_; }
 
-  /// Sets the depth changes of a frame's keypoints, by reading their depths as if the depth image had been captured
-  /// earlier or later. `read_depth(frame, motion)` sets the depths of `as_read`; `assumed`: the motion and the shutter
-  /// assumed for the frame.
-  template <feature_descriptor D, class ReadDepth>
-  static void set_changes(basic_frame<D>& f, const frame_motion& assumed, ReadDepth&& read_depth) {
-    basic_frame<D> now, later, earlier;
-    now.as_read = later.as_read = earlier.as_read = f.as_read;
-    const auto read = [&](basic_frame<D>& at, double by) {
-      frame_motion motion = assumed;
-      motion.shutter.depth_delay += by;
-      read_depth(at, motion);
-    };
-    read(now, 0.0);
-    read(later, depth_change::step);
-    read(earlier, -depth_change::step);
-    for (std::size_t i = 0; i != f.as_read.size(); ++i) {
-      const float a = earlier.as_read[i].depth, b = now.as_read[i].depth, c = later.as_read[i].depth;
-      if (a > 0.0F && b > 0.0F && c > 0.0F) f.as_read[i].change = {c - b, a - b};
-    }
-  }
-
   /// Adds a tracked frame that follows `last` (as tracked, with its current pose). `keyframe`: the keyframe created
-  /// from the frame, if any. Returns the shutter to assume for subsequent frames, if it changes.
+  /// from the frame, if any; `read`: reads the frame's depth image, also after the call. Returns the shutter to assume
+  /// for subsequent frames, if it changes.
   template <feature_descriptor D, camera::camera_model Camera>
   [[nodiscard]] std::optional<camera::shutter> add(const basic_frame<D>& last, const basic_frame<D>& f,
-                                                   const std::optional<map_keyframe>& keyframe, const basic_map<D>& m,
-                                                   const camera_rig<Camera>& rig, const camera::shutter& assumed) {
+                                                   const std::optional<map_keyframe>& keyframe, row_reader read,
+                                                   const basic_map<D>& m, const camera_rig<Camera>& rig,
+                                                   const camera::shutter& assumed) {
     const vec6 motion = motion_between(last, f);
     if (before_ && before_that_) {
       // The velocity at the boundary of two intervals, from the mean velocities of three intervals: exact for motions
       // that are cubic in time.
       pending_.T_world_camera = last.T_world_camera;
       pending_.twist = (-*before_that_ + 5.0 * *before_ + 2.0 * motion) / 6.0;
+      read_depths();
       compare(m, rig, assumed);
       if (pending_keyframe_) keep(*pending_keyframe_);
     }
     before_that_ = before_;
     before_ = motion;
     set_pending(f, keyframe, rig);
+    read_ = std::move(read);
     watched_ += f.timestamp - last.timestamp;
     return decide(assumed);
   }
@@ -87,11 +70,30 @@ class shutter_observer {
   void set_pending(const basic_frame<D>& f, const std::optional<map_keyframe>& keyframe,
                    const camera_rig<Camera>& rig) {
     pending_.read = f.as_read;
+    pending_.shutter = f.shutter;
     pending_.landmarks = f.landmarks;
     pending_.information.resize(f.size());
     for (std::size_t i = 0; i != f.size(); ++i)
       pending_.information[i] = rig.scales.information(f.features.keypoints[i].octave);
     pending_keyframe_ = keyframe;
+  }
+
+  /// Reads the depths of the pending frame with its final twist: the error of the twist assumed in tracking would
+  /// shorten the estimated delay. Also sets their changes with the delay.
+  void read_depths() {
+    const auto read = [&](double later) {
+      frame_motion motion{pending_.shutter, pending_.twist};
+      motion.shutter.depth_delay += later;
+      auto keypoints = pending_.read;
+      read_(keypoints, motion);
+      return keypoints;
+    };
+    const auto later = read(depth_change::step), earlier = read(-depth_change::step);
+    read_(pending_.read, {pending_.shutter, pending_.twist});
+    for (std::size_t i = 0; i != pending_.read.size(); ++i) {
+      const float a = earlier[i].depth, b = pending_.read[i].depth, c = later[i].depth;
+      if (a > 0.0F && b > 0.0F && c > 0.0F) pending_.read[i].change = {c - b, a - b};
+    }
   }
 
   template <feature_descriptor D, camera::camera_model Camera>
@@ -142,6 +144,7 @@ class shutter_observer {
   std::optional<shutter_estimate> last_;  ///< estimate at the last change of the shutter
   std::vector<std::pair<map_keyframe, row_view>> views_;
   row_view pending_;
+  row_reader read_;  ///< reads the depth image of the pending frame
   std::optional<map_keyframe> pending_keyframe_;
   /// Mean twist in the interval before the pending frame, and in the interval before that one.
   std::optional<vec6> before_, before_that_;

@@ -13,7 +13,6 @@
 #include <orbis/slam/detail/map/point_observation.hpp>
 #include <orbis/slam/detail/shutter/motion_refinement.hpp>
 #include <orbis/slam/detail/shutter/row_times.hpp>
-#include <orbis/slam/detail/shutter/shutter_observer.hpp>
 #include <orbis/slam/ids.hpp>
 
 namespace orbis::slam::detail {
@@ -31,7 +30,7 @@ class frame_refinement {
   /// time, based on the motion from the last frame to the frame's current pose.
   void correct_rows(const task& t) const {
     if (t.frame.shutter.is_global()) return;
-    t.read_rows(t.frame, {t.frame.shutter, motion_between(c_.last, t.frame)});
+    t.read_rows(t.frame.as_read, {t.frame.shutter, motion_between(c_.last, t.frame)});
     move_keypoints(t.frame);
   }
   /// With a rolling shutter, corrects the keypoints of a frame to the frame's time, based on the motion from the last
@@ -78,7 +77,7 @@ class frame_refinement {
     if (!rolls && with_depth) find_row_observations(f, m, c_.rig, rows_);
     for (int round = 0; round != rounds; ++round) {
       if (rolls) {
-        t.read_rows(f, {f.shutter, refined.twist});  // depth was read assuming the previous motion
+        t.read_rows(f.as_read, {f.shutter, refined.twist});  // depth was read assuming the previous motion
         find_row_observations(f, m, c_.rig, rows_);
       }
       if (with_depth) c_.depth_quadratic = c_.depth.term_at(refined, f.shutter);
@@ -92,8 +91,6 @@ class frame_refinement {
     }
     if (f.shutter.is_depth_early()) early_depth_.advance();
     f.T_world_camera = refined.T_world_camera;
-    if (c_.observer)
-      shutter_observer::set_changes(f, {f.shutter, rolls ? refined.twist : expected_twist()}, t.read_rows);
     if (!rolls) {
       f.twist = expected_twist();
       return;

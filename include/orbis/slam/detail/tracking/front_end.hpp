@@ -140,7 +140,7 @@ class front_end {
       if (needs_keyframe(t, result.inliers)) result.made = make_keyframe(t);
     }
     if (start_.first()) result.first = start_.first()->keyframe;
-    finish(std::move(t.frame), t.maps, result.made);
+    finish(t, result.made);
     if (!t.is_frozen) forget_erased(t.maps);
     return result;
   }
@@ -241,14 +241,16 @@ class front_end {
     return context_.reference = {t.maps.active_id(), id};
   }
   /// Counts a frame and, if it was localised, keeps it. `made`: the keyframe created from the frame, if any.
-  void finish(frame_type f, const atlas_type& maps, const std::optional<map_keyframe>& made) {
+  void finish(const task& t, const std::optional<map_keyframe>& made) {
+    frame_type& f = t.frame;
+    const atlas_type& maps = t.maps;
     const track_state state = context_.state;
     ++counters_.frames;
     counters_.tracked += is_tracking();
     counters_.relocalized += state == track_state::relocalized;
     counters_.lost += state == track_state::lost;
     context_.motion.reset();
-    if (context_.observer) observe(f, maps, made);
+    if (context_.observer) observe(t, made);
     if (!is_tracking()) return;
     start_.forget_candidates();
     const anchored_pose anchor = context_.refer(f, maps);
@@ -268,9 +270,10 @@ class front_end {
     if (!made) young_.localize_oldest(log_, maps);
   }
   /// Passes a tracked frame to the shutter observer.
-  void observe(const frame_type& f, const atlas_type& maps, const std::optional<map_keyframe>& made) {
-    if (!context_.follows_last(f)) return context_.observer->interrupt();
-    if (const auto changed = context_.observer->add(context_.last, f, made, maps.active(), context_.rig, shutter_))
+  void observe(const task& t, const std::optional<map_keyframe>& made) {
+    if (!context_.follows_last(t.frame)) return context_.observer->interrupt();
+    if (const auto changed =
+            context_.observer->add(context_.last, t.frame, made, t.read_rows, t.map(), context_.rig, shutter_))
       shutter_ = *changed;
   }
 

@@ -38,8 +38,8 @@ struct tracking_task {
   bool is_frozen = false;  ///< true if the maps are not changed and no map is started
   /// Returns true if the back end accepts another keyframe of an existing map.
   std::function<bool()> has_room;
-  /// Sets the depths of the keypoints as read by a rolling shutter (`as_read`), given the motion.
-  std::function<void(basic_frame<D>&, const frame_motion&)> read_rows;
+  /// Reads the depth image of the frame; while the shutter is estimated, also after the call.
+  row_reader read_rows;
   /// Returns the ids of the `count` keyframes with the most similar appearance.
   std::function<std::vector<map_keyframe>(const decltype(basic_frame<D>::features)&, std::size_t count)> find_similar;
   /// Called for the previous map when a new one is started, if the previous map has few keyframes.
