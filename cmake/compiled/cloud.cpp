@@ -6,6 +6,7 @@
 
 #include <orbis/cloud/all_knn-inl.hpp>
 #include <orbis/cloud/cluster-inl.hpp>
+#include <orbis/cloud/depth_smoothing-inl.hpp>
 #include <orbis/cloud/flying_pixels-inl.hpp>
 #include <orbis/cloud/log_statistical-inl.hpp>
 #include <orbis/cloud/radius-inl.hpp>
@@ -29,5 +30,7 @@ template automatic_result choose_and_filter(const policy&, const point_view&, st
                                             const select_options&, const view_judge&);
 template flying_pixel_count read_without_flying_pixels(const policy&, const depth_row_reader&, image_view<float>,
                                                        const flying_pixel_options&, flying_pixel_workspace&);
+template void write_smoothed_depth(const policy&, const depth_row_reader&, image_view<float>,
+                                   const depth_smoothing_options&, image<float>&);
 
 }  // namespace orbis::cloud::detail

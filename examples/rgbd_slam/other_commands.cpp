@@ -29,6 +29,7 @@
 #include "navigation.hpp"
 #include "output.hpp"
 #include "result_files.hpp"
+#include "smooth_frame.hpp"
 #include "source.hpp"
 #include "summary.hpp"
 #include "tracking_stage.hpp"
@@ -59,6 +60,7 @@ orbis::result<posed_frames> frames_with_poses(const frame_source& source, const 
   const auto shutter = source.camera.shutter.value_or(orbis::camera::shutter{});
   posed_frames posed{source, s, spill_file};
   frame_correction correct{source.camera.model};
+  frame_smoother smooth{source.camera.model};
   orbis::camera::depth_clock clock;
   orbis::se3 T_world_truth;
   read_ahead frames{source, s.threads != 1};
@@ -78,7 +80,7 @@ orbis::result<posed_frames> frames_with_poses(const frame_source& source, const 
       motion.shutter.depth_delay += depth_delay;
       const orbis::camera::rgbd_frame& at_once = correct(*frame, motion);
       posed.add(i, T_world_truth * *frame->T_world_camera, &at_once == &*frame ? orbis::slam::frame_motion{} : motion,
-                at_once);
+                smooth(at_once));
     }
     console.advance(i + 1, source.frames);
   }

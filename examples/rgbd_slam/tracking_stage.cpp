@@ -21,6 +21,7 @@
 #include "profiles.hpp"
 #include "result_files.hpp"
 #include "slam_options.hpp"
+#include "smooth_frame.hpp"
 #include "static_frame.hpp"
 #include "upright_world.hpp"
 
@@ -109,6 +110,7 @@ void track_frames(slam_system& slam, const frame_source& source, const settings&
   read_ahead frames{source, s.threads != 1 && !source.is_live};
   frame_correction correct{source.camera.model};
   static_frames remove_moving{source.camera.model};
+  frame_smoother smooth{source.camera.model};
   camera_pace pace;
   for (std::size_t i = 0; frames.has_next() && !interrupts::stop_requested(); ++i) {
     auto frame = frames.next();
@@ -130,7 +132,7 @@ void track_frames(slam_system& slam, const frame_source& source, const settings&
     if (is_mapped) source.complete(*frame);
     const orbis::slam::frame_motion motion{found.shutter, found.twist};
     const orbis::camera::rgbd_frame& at_once = is_mapped ? correct(*frame, motion) : *frame;
-    const orbis::camera::rgbd_frame& for_map = is_mapped ? remove_moving(at_once, slam.last_frame()) : at_once;
+    const orbis::camera::rgbd_frame& for_map = is_mapped ? smooth(remove_moving(at_once, slam.last_frame())) : at_once;
     if (has_keyframe)
       out.keyframes.add(i, {found.map, *found.keyframe}, &at_once == &*frame ? orbis::slam::frame_motion{} : motion,
                         for_map);

@@ -6,6 +6,7 @@
 /// | -------------------------- | --------------------------------------------------------------------------- |
 /// | `all_knn.hpp`              | k nearest neighbours of every point, and the mean distance to them          |
 /// | `cluster.hpp`              | filter: small groups of points far from the surface                         |
+/// | `depth_smoothing.hpp`      | edge-preserving smoothing of depth images                                   |
 /// | `extract.hpp`              | points with given indices or inside a box; treatment of non-finite points   |
 /// | `filter_chain.hpp`         | a sequence of filters with their parameters                                 |
 /// | `filter_choice.hpp`        | options and result of the automatic selection, with its evidence            |
@@ -26,6 +27,7 @@
 
 #include <orbis/cloud/all_knn.hpp>
 #include <orbis/cloud/cluster.hpp>
+#include <orbis/cloud/depth_smoothing.hpp>
 #include <orbis/cloud/extract.hpp>
 #include <orbis/cloud/filter_chain.hpp>
 #include <orbis/cloud/filter_choice.hpp>
