@@ -63,6 +63,8 @@ struct keypoint_as_read {
 struct pixel_spread {
   float deviation = 1.0F;                ///< standard deviation in all directions, > 0
   float smear_x = 0.0F, smear_y = 0.0F;  ///< direction of the motion blur times the standard deviation along it
+
+  [[nodiscard]] vec2 smear() const noexcept { return {static_cast<double>(smear_x), static_cast<double>(smear_y)}; }
 };
 
 /// An image represented by features with descriptors of type `D`. Each vector has one entry per keypoint; some vectors

@@ -36,7 +36,7 @@ inline void set_spread(optimize::pose_observation& o, const pixel_spread& spread
   const double deviation = static_cast<double>(spread.deviation);
   o.information /= deviation * deviation;
   o.depth_weight = std::min(1.0, deviation);
-  o.smear = vec2(static_cast<double>(spread.smear_x), static_cast<double>(spread.smear_y)) / deviation;
+  o.smear = spread.smear() / deviation;
 }
 
 /// Returns the observation of the landmark of keypoint `i`, at `position` (world, metres).
@@ -60,7 +60,7 @@ template <camera::camera_model Camera, feature_descriptor D>
 [[nodiscard]] bool agrees(const camera_rig<Camera>& rig, const basic_frame<D>& f, const se3& T_camera_world,
                           std::size_t i, const vec3& point) {
   optimize::pose_observation o = make_observation(rig, f, i, point);
-  o.smear = vec2(static_cast<double>(f.spread(i).smear_x), static_cast<double>(f.spread(i).smear_y));
+  o.smear = f.spread(i).smear();
   const auto error = rig.model.residual(T_camera_world * point, o);
   return error && squared_norm(*error) * o.information <= error_limit(o.has_depth());
 }

@@ -94,7 +94,7 @@ class patch_tracker {
       if (!found || found->correlation < options_.min_correlation) continue;
       const vec2 shift = found->shift.x() * view->across + found->shift.y() * view->down;
       if (!move_keypoint(f, i, view->pixel + shift, view->delay)) continue;
-      f.spreads[i] = patch_spread(l.patch, *view, scale);
+      f.spreads[i] = patch_spread(l.patch, *view, scale, seconds);
     }
     if (moved_.empty() && seconds == 0.0) f.spreads.clear();  // all are the default
     f.grid.assign(f.features.keypoints);
@@ -198,14 +198,16 @@ class patch_tracker {
   /// Returns the smear of a corner that may be found anywhere on its streak.
   [[nodiscard]] static vec2 corner_smear(const vec2& streak) { return streak / std::sqrt(12.0); }
   /// Returns the uncertainty of the position found for a patch. `scale`: size of a pixel of the keypoint's level,
-  /// pixels of the image. The constants were measured in simulated rooms: along the longer streak of patch and image,
-  /// the error of a flat patch is 0.1 of its pixels if that streak has 8 pixels, and increases rapidly with the length,
-  /// as little texture is left; patches with several surfaces have three times the error.
-  [[nodiscard]] pixel_spread patch_spread(const landmark_patch& patch, const patch_view& v, double scale) const {
+  /// pixels of the image; `seconds`: exposure time. The constants were measured in simulated rooms: along the longer
+  /// streak of patch and image, the error of a flat patch is 0.1 of its pixels if that streak has 8 pixels, and
+  /// increases rapidly with the length, as little texture is left; patches with several surfaces have three times the
+  /// error.
+  [[nodiscard]] pixel_spread patch_spread(const landmark_patch& patch, const patch_view& v, double scale,
+                                          double seconds) const {
     constexpr double error = 0.1, length = 8.0, power = 2.5, uneven = 3.0;
     const double times = patch.is_flat ? 1.0 : uneven;
     const vec2& motion = norm(patch.motion) > norm(v.motion) ? patch.motion : v.motion;
-    const double streak = exposure() * norm(motion);
+    const double streak = seconds * norm(motion);
     vec2 smear = zeros<vec2>();
     if (streak > 0.0) {
       const double along = error * std::pow(std::min(streak, line_kernel::longest) / length, power);
@@ -218,7 +220,7 @@ class patch_tracker {
   /// Along the smear, the error is ignored.
   [[nodiscard]] static double error_size(const vec2& error, const pixel_spread& spread) {
     constexpr double by_direction = 1.1774 / 0.6745;  // medians of the Rayleigh and the half-normal distribution
-    const vec2 smear(static_cast<double>(spread.smear_x), static_cast<double>(spread.smear_y));
+    const vec2 smear = spread.smear();
     const double size = norm(smear);
     if (!(size > 0.0)) return norm(error);
     return by_direction * std::abs(error.x() * smear.y() - error.y() * smear.x()) / size;
@@ -249,11 +251,14 @@ class patch_tracker {
     if (!rig_.camera().project(point, by_point)) return zeros<vec2>();
     return by_point * (cross(tail<3>(twist), point) + head<3>(twist));
   }
+  /// Returns the number of pyramid levels of the image that have a scale.
+  [[nodiscard]] std::size_t levels() const {
+    return std::min(image_.levels->size(), static_cast<std::size_t>(rig_.scales.levels()));
+  }
   /// Returns the level whose pixel size is nearest to `scale` (pixels of the image).
   [[nodiscard]] std::size_t nearest_level(double scale) const {
-    const auto levels = std::min(image_.levels->size(), static_cast<std::size_t>(rig_.scales.levels()));
     std::size_t level = 0;
-    while (level + 1 < levels && rig_.scales.scale(static_cast<int>(level)) * std::sqrt(rig_.scales.factor()) < scale)
+    while (level + 1 < levels() && rig_.scales.scale(static_cast<int>(level)) * std::sqrt(rig_.scales.factor()) < scale)
       ++level;
     return level;
   }
@@ -355,8 +360,7 @@ class patch_tracker {
   /// pixels of the image is too long for a patch there, a coarser one. @pre the patch has room on level `octave`
   [[nodiscard]] std::size_t patch_level(std::size_t octave, const vec2& pixel, double length) const {
     constexpr double longest = 10.0;  // pixels of the level
-    const auto levels = std::min(image_.levels->size(), static_cast<std::size_t>(rig_.scales.levels()));
-    while (length > longest * rig_.scales.scale(static_cast<int>(octave)) && octave + 1 < levels &&
+    while (length > longest * rig_.scales.scale(static_cast<int>(octave)) && octave + 1 < levels() &&
            has_room(pixel, (*image_.levels)[octave + 1]))
       ++octave;
     return octave;
