@@ -165,8 +165,8 @@ class shutter_estimator {
   /// one. O(keyframes).
   [[nodiscard]] shutter_estimate estimate(const camera::shutter& assumed = {}) const {
     constexpr std::size_t enough = 8;
-    // Errors of the velocity shorten a delay by about a tenth, as simulations show.
-    constexpr double shortening = 0.1;
+    // Errors of the velocity bias the estimates by up to these shares, as simulations show.
+    constexpr double read_out_bias = 0.02, delay_bias = 0.1;
     shutter_estimate result;
     if (blocks_.size() < enough) return result;
     shutter_equations sum;
@@ -191,10 +191,13 @@ class shutter_estimator {
     const matrix<2, 2> covariance = n / (n - 1.0) * (inverse * spread * inverse);
     if (!all_finite(found) || !all_finite(covariance)) return result;
     result.read_out = found[0];
-    result.read_out_deviation = std::sqrt(std::max(0.0, covariance(0, 0)));
+    const auto deviation = [](double variance, double bias) {
+      return std::sqrt(std::max(0.0, variance) + bias * bias);
+    };
+    result.read_out_deviation = deviation(covariance(0, 0), read_out_bias * found[0]);
     if (tells_delay) {
       result.delay = found[1];
-      result.delay_deviation = std::hypot(std::sqrt(std::max(0.0, covariance(1, 1))), shortening * found[1]);
+      result.delay_deviation = deviation(covariance(1, 1), delay_bias * found[1]);
     }
     const auto holds = [](double value, double deviation, double before, double least, double most) {
       const double sigmas = before == 0.0 ? 5.0 : 2.5;
