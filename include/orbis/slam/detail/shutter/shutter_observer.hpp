@@ -28,7 +28,7 @@ namespace orbis::slam::detail {
 /// determined from both neighbouring frames. Periodically proposes the resulting shutter.
 class shutter_observer {
  public:
-  [[nodiscard]] shutter_estimate estimate() const { return estimate_; }
+  [[nodiscard]] shutter_estimate estimate() const { return reported_; }
 
   /// Adds a tracked frame that follows `last` (as tracked, with its current pose). `keyframe`: the keyframe created
   /// from the frame, if any; `read`: reads the frame's depth image, also after the call. Returns the shutter to assume
@@ -119,7 +119,13 @@ class shutter_observer {
     if (watched_ - looked_ < often) return std::nullopt;
     looked_ = watched_;
     const shutter_estimate now = estimator_.estimate(assumed);
-    estimate_ = best(now);
+    // After a change, the first estimates have few measurements.
+    if (!last_ || now.read_out_deviation <= 2.0 * last_->read_out_deviation) {
+      estimate_ = now;
+      reported_ = with_distance(now, assumed);
+    } else {
+      estimate_ = *last_;
+    }
     if (watched_ < std::max(first, 1.5 * decided_) || !std::isfinite(now.read_out_deviation)) return std::nullopt;
     decided_ = watched_;
     const camera::shutter& next = estimate_.shutter;
@@ -133,14 +139,17 @@ class shutter_observer {
     return next;
   }
 
-  /// Returns the new estimate if its deviation is at most twice that of the previous one, which was linearised around a
-  /// less accurate shutter; otherwise the previous one.
-  [[nodiscard]] shutter_estimate best(const shutter_estimate& now) const {
-    return last_ && !(now.read_out_deviation <= 2.0 * last_->read_out_deviation) ? *last_ : now;
+  /// Adds to the deviations for the distance from the assumed shutter, around which the equations were linearised.
+  [[nodiscard]] static shutter_estimate with_distance(shutter_estimate e, const camera::shutter& assumed) {
+    constexpr double share = 0.5;
+    e.read_out_deviation = std::hypot(e.read_out_deviation, share * (e.read_out - assumed.color_read_out));
+    e.delay_deviation = std::hypot(e.delay_deviation, share * (e.delay - assumed.depth_delay));
+    return e;
   }
 
   shutter_estimator estimator_;
-  shutter_estimate estimate_;
+  shutter_estimate estimate_;             ///< with the deviations of the linear equations
+  shutter_estimate reported_;             ///< with their linearisation error
   std::optional<shutter_estimate> last_;  ///< estimate at the last change of the shutter
   std::vector<std::pair<map_keyframe, row_view>> views_;
   row_view pending_;
