@@ -92,7 +92,7 @@ places=(tests/core/simd.cpp tests/core/simd tests/core/rounded.cpp tests/core/by
   tests/camera/shutter_correction.cpp
   tests/features/detail tests/features/grey_luma_row.cpp tests/places/detail tests/places/vocabulary_descent.cpp
   tests/cloud/detail/knn tests/cloud/detail/rays tests/cloud/detail/voxels
-  tests/cloud/cluster_visit_near.cpp tests/cloud/detail/select/local_shape.cpp tests/optimize/pnp.cpp
+  tests/cloud/cluster_visit_near.cpp tests/cloud/depth_smoothing.cpp tests/cloud/detail/select/local_shape.cpp tests/optimize/pnp.cpp
   tests/optimize/detail/bundle tests/optimize/detail/sparse tests/optimize/detail/pose
   tests/optimize/pose_refinement_pose_pieces.cpp
   tests/optimize/bundle_instances*.cpp  # shared by the tests of bundle adjustment

@@ -60,7 +60,7 @@ orbis::result<posed_frames> frames_with_poses(const frame_source& source, const 
   const auto shutter = source.camera.shutter.value_or(orbis::camera::shutter{});
   posed_frames posed{source, s, spill_file};
   frame_correction correct{source.camera.model};
-  frame_smoother smooth{source.camera.model};
+  frame_smoother smooth{source};
   orbis::camera::depth_clock clock;
   orbis::se3 T_world_truth;
   read_ahead frames{source, s.threads != 1};

@@ -6,21 +6,23 @@
 #include <algorithm>
 #include <cstdint>
 
-#include <orbis/camera/any.hpp>
 #include <orbis/camera/rgbd_frame.hpp>
 #include <orbis/cloud/depth_smoothing.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/image.hpp>
-#include <orbis/core/types.hpp>
+
+#include "source.hpp"
 
 namespace app {
 
+/// Smooths depth images according to the noise of their sensor.
 class frame_smoother {
  public:
-  explicit frame_smoother(const orbis::camera::any_camera& camera) {
-    const orbis::vec2 middle{0.5 * camera.width(), 0.5 * camera.height()};
-    const auto ray = camera.unproject(middle), next = camera.unproject(middle + orbis::vec2::UnitX());
-    if (ray && next) options_.steepest = steepest * (*next - *ray).norm();
+  explicit frame_smoother(const frame_source& source) {
+    const double focal = source.camera.model.k().fx;
+    options_.steepest = steepest / focal;
+    if (source.is_stereo() && source.camera.baseline)
+      options_.noise = disparity_noise / (focal * *source.camera.baseline);
   }
 
   /// The frame with smoothed depth, in the unit of its depth image. Valid until the next call.
@@ -39,7 +41,8 @@ class frame_smoother {
   }
 
  private:
-  static constexpr double steepest = 4.0;  // tangent of the steepest slant of a surface that is measured: 76 degrees
+  static constexpr double steepest = 4.0;          // tangent of the steepest slant of a measured surface: 76 degrees
+  static constexpr double disparity_noise = 0.25;  // standard deviation of stereo matching, pixels
   orbis::cloud::depth_smoothing_options options_;
   orbis::image<float> metres_, memory_;
   orbis::camera::rgbd_frame smooth_;

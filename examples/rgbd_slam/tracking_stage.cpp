@@ -110,7 +110,7 @@ void track_frames(slam_system& slam, const frame_source& source, const settings&
   read_ahead frames{source, s.threads != 1 && !source.is_live};
   frame_correction correct{source.camera.model};
   static_frames remove_moving{source.camera.model};
-  frame_smoother smooth{source.camera.model};
+  frame_smoother smooth{source};
   camera_pace pace;
   for (std::size_t i = 0; frames.has_next() && !interrupts::stop_requested(); ++i) {
     auto frame = frames.next();

@@ -366,6 +366,7 @@ TEST_CASE("Depth that lags or comes early is found to two milliseconds") {
     CHECK(std::abs(found.delay - delay) < 0.002);
     CHECK(std::abs(found.shutter.depth_delay - delay) < 0.002);
     CHECK(found.delay_deviation < 0.002);
+    CHECK(std::abs(found.delay - delay) < 2.0 * found.delay_deviation);
   }
 }
 
@@ -386,6 +387,8 @@ TEST_CASE("The shutter is found from the frames") {
       estimate_of({.color_read_out = 0.025, .depth_read_out = 0.025, .depth_delay = 0.012});
   CHECK(std::abs(rolling.shutter.color_read_out - 0.025) < 0.002);
   CHECK(rolling.read_out_deviation < 0.002);
+  CHECK(std::abs(rolling.read_out - 0.025) < 2.0 * rolling.read_out_deviation);
+  CHECK(std::abs(rolling.delay - 0.012) < 2.0 * rolling.delay_deviation);
   CHECK(std::abs(rolling.shutter.depth_delay - 0.012) < 0.006);  // it takes longer to be known well
   const slam::shutter_estimate global = estimate_of({});
   CHECK(global.shutter.is_global());

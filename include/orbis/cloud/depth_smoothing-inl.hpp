@@ -15,6 +15,9 @@
 
 namespace orbis::cloud::detail {
 
+/// Maximum number of floats in a native vector.
+inline constexpr std::size_t widest_vector = 16;
+
 /// A pair of opposite pixels.
 struct pixel_pair {
   std::ptrdiff_t offset;  ///< of one pixel in the padded image; the other is at the negative offset
@@ -22,9 +25,9 @@ struct pixel_pair {
 };
 
 struct smoothing_limits {
-  float noise;          ///< maximum difference between the sum of a pair and twice the pixel, 1 / metre
-  float resolution;     ///< as above, for quantisation: metres
-  float min_agreement;  ///< see depth_smoothing_options
+  float noise;        ///< maximum difference between the sum of a pair and twice the pixel, 1 / metre
+  float resolution;   ///< as above, for quantisation: metres
+  float min_support;  ///< see depth_smoothing_options
 };
 
 /// Writes the smoothed depths of a row of `width` pixels. `center`: their inverse depths, NaN where unknown, followed
@@ -34,20 +37,24 @@ struct smooth_row {
   static ORBIS_ALWAYS_INLINE void run(const float* center, int width, std::span<const pixel_pair> pairs,
                                       const smoothing_limits& limits, float* depth) {
     using lanes = simd::native_vec<float, Target>;
+    static_assert(lanes::count <= widest_vector);
     const lanes zero(0.0F), one(1.0F);
     for (int x = 0; x < width; x += static_cast<int>(lanes::count), center += lanes::count) {
       const lanes w = lanes::load(center), twice = w + w;
       const lanes apart = max(lanes(limits.noise), lanes(limits.resolution) * (w * w));
-      lanes sum = w, agreed = zero, seen = zero;
+      lanes sum = w, agreed = zero, near = zero, seen = zero;
       for (const pixel_pair& pair : pairs) {
-        const lanes before = lanes::load(center - pair.offset), both = before + lanes::load(center + pair.offset);
-        const auto agrees = (abs(both - twice) < apart) & (abs(before - w) < max(apart, lanes(pair.steepest) * w));
+        const lanes before = lanes::load(center - pair.offset), after = lanes::load(center + pair.offset);
+        const lanes both = before + after, slope = max(apart, lanes(pair.steepest) * w);
+        const auto before_is_near = abs(before - w) < slope, after_is_near = abs(after - w) < slope;
+        const auto agrees = (abs(both - twice) < apart) & before_is_near;
         sum = sum + select(agrees, both, zero);
         agreed = agreed + select(agrees, one, zero);
-        seen = seen + select(both > zero, one, zero);
+        near = near + select(before_is_near, one, zero) + select(after_is_near, one, zero);
+        seen = seen + select(before > zero, one, zero) + select(after > zero, one, zero);
       }
       const lanes mean = (agreed + agreed + one) / sum;
-      const lanes kept = select((w > zero) & (agreed + one >= lanes(limits.min_agreement) * seen), mean, zero);
+      const lanes kept = select((w > zero) & (near >= lanes(limits.min_support) * seen), mean, zero);
       kept.store(depth + x, std::min(lanes::count, static_cast<std::size_t>(width - x)));
     }
   }
@@ -57,8 +64,7 @@ template <execution_policy Policy>
 void write_smoothed_depth(const Policy& policy, const depth_row_reader& depth, image_view<float> out,
                           const depth_smoothing_options& options, image<float>& memory) {
   const int width = out.width(), height = out.height(), radius = options.radius;
-  constexpr int lanes = 16;  // of the widest vector
-  const int padded_width = width + 2 * radius + lanes, padded_height = height + 2 * radius;
+  const int padded_width = width + 2 * radius + static_cast<int>(widest_vector), padded_height = height + 2 * radius;
   constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
   if (memory.width() != padded_width || memory.height() != padded_height)
     memory = image<float>(padded_width, padded_height);
@@ -73,7 +79,7 @@ void write_smoothed_depth(const Policy& policy, const depth_row_reader& depth, i
       w[x] = w[x] > 0.0F && w[x] < std::numeric_limits<float>::infinity() ? 1.0F / w[x] : unknown;
   });
 
-  std::array<pixel_pair, 144> pairs;  // half of the pixels of the largest disc
+  std::array<pixel_pair, (17 * 17 - 1) / 2> pairs;  // of the square around the largest disc
   std::size_t count = 0;
   const std::ptrdiff_t stride = image_view<float>(memory).stride();
   for (int dy = 0; dy <= radius; ++dy)
@@ -82,8 +88,8 @@ void write_smoothed_depth(const Policy& policy, const depth_row_reader& depth, i
         pairs[count++] = {dy * stride + dx, static_cast<float>(options.steepest * std::max(std::abs(dx), dy))};
   const double of_sum = std::sqrt(6.0) * options.sigmas;  // of the sum of a pair minus twice the pixel
   const smoothing_limits limits{static_cast<float>(of_sum * options.noise),
-                                static_cast<float>(0.5 * of_sum * options.resolution),
-                                static_cast<float>(options.min_agreement)};
+                                static_cast<float>(of_sum * 0.5 * options.resolution),  // rounded by up to half a step
+                                static_cast<float>(options.min_support)};
   auto* const smooth =
       simd::kernel<smooth_row, void(const float*, int, std::span<const pixel_pair>, const smoothing_limits&, float*)>();
   for_each_index(policy, static_cast<std::size_t>(height), grain, [&](std::size_t row) {

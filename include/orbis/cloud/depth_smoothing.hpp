@@ -4,9 +4,9 @@
 ///
 /// Inverse depth is linear over the image of a plane of any slant, so the mean of two pixels on opposite sides of a
 /// pixel, at the same distance, measures the inverse depth of the pixel itself. Each pixel becomes the mean of itself
-/// and of all such pairs around it that agree with it within the noise. A pair across an edge does not agree. Pixels
-/// with which few pairs agree are not on a surface: they lie on the ramp between two surfaces that a depth camera sees
-/// while it moves.
+/// and of all such pairs around it that agree with it within the noise. A pair across an edge does not agree. A pixel
+/// is removed if it is on no surface, that is, if few of the pixels around it are at a depth that a slanted surface
+/// could have there: a depth camera that moves measures a steep ramp between two surfaces.
 ///
 /// Sources: C. Tomasi, R. Manduchi, "Bilateral filtering for gray and color images", ICCV 1998; its use on depth images
 /// before they are mapped: R. A. Newcombe et al., "KinectFusion: real-time dense surface mapping and tracking", ISMAR
@@ -16,25 +16,27 @@
 #include <cassert>
 
 #include <orbis/camera/depth.hpp>
+#include <orbis/cloud/detail/depth_row_reader.hpp>
 #include <orbis/cloud/detail/point_view.hpp>
-#include <orbis/cloud/flying_pixels.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/image.hpp>
 
 namespace orbis::cloud {
 
+/// Parameters of `smooth_depth`.
 struct depth_smoothing_options {
   int radius = 3;             ///< maximum distance of the pixels of a pair from the pixel, pixels; 1 ... 8
   double noise = 1.425e-3;    ///< standard deviation of inverse depth, sigma_z / z^2, 1 / metre; default: a Kinect's
   double resolution = 0.001;  ///< quantisation step of depth, metres
-  /// Maximum difference between the mean of a pair and the pixel, in multiples of its standard deviation.
+  /// Maximum difference between the mean of a pair and the pixel, in multiples of the difference's standard deviation.
   double sigmas = 2.0;
   /// Maximum relative change of inverse depth per pixel on a surface: the tangent of its steepest slant divided by the
   /// focal length in pixels. Default: 75 degrees at 500 pixels.
   double steepest = 0.0075;
-  /// A pixel is removed if the number of its pairs that agree with it, plus one, is less than this share of its pairs
-  /// with two depths; 0: none is removed. The default keeps pixels at straight edges, and objects two pixels wide.
-  double min_agreement = 0.2;
+  /// A pixel is removed if fewer than this share of the pixels around it that have a depth could be on the same
+  /// surface; 0: none is removed. The default keeps pixels at edges and corners, and objects with a width of two
+  /// pixels.
+  double min_support = 0.25;
 };
 
 namespace detail {

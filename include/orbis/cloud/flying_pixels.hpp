@@ -23,6 +23,7 @@
 #include <vector>
 
 #include <orbis/camera/depth.hpp>
+#include <orbis/cloud/detail/depth_row_reader.hpp>
 #include <orbis/cloud/detail/point_view.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/image.hpp>
@@ -79,19 +80,6 @@ class flying_pixel_workspace {
 };
 
 namespace detail {
-
-/// Reads a row of a depth image in metres.
-struct depth_row_reader {
-  const void* depth = nullptr;
-  void (*read)(const void* depth, int y, int width, float* out) = nullptr;
-};
-template <camera::depth_source Depth>
-[[nodiscard]] depth_row_reader make_row_reader(const Depth& depth) noexcept {
-  return {&depth, [](const void* from, int y, int width, float* out) {
-            const Depth& image = *static_cast<const Depth*>(from);
-            for (int x = 0; x != width; ++x) out[x] = image(x, y);
-          }};
-}
 
 /// `remove_flying_pixels` on a type-erased depth image.
 template <execution_policy Policy>

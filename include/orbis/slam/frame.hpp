@@ -55,7 +55,7 @@ struct keypoint_as_read {
   float x = 0.0F, y = 0.0F;         ///< pixels
   float depth = 0.0F;               ///< depth at the time of the row, metres; 0 if unknown
   float stored_depth = 0.0F;        ///< value of the depth image at the keypoint, metres; 0 if not measured
-  depth_change change{};            ///< change of `depth`; zero unless the shutter is estimated
+  depth_change change{};            ///< change of `depth`; set only for the estimation of the shutter
 };
 
 /// Uncertainty of a keypoint's position, in pixels of its pyramid level: the covariance is `deviation^2 I + s s^T`,
@@ -64,6 +64,7 @@ struct pixel_spread {
   float deviation = 1.0F;                ///< standard deviation in all directions, > 0
   float smear_x = 0.0F, smear_y = 0.0F;  ///< direction of the motion blur times the standard deviation along it
 
+  /// (smear_x, smear_y), pixels of the level.
   [[nodiscard]] vec2 smear() const noexcept { return {static_cast<double>(smear_x), static_cast<double>(smear_y)}; }
 };
 

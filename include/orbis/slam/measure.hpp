@@ -140,9 +140,9 @@ template <camera::camera_model Camera, feature_extractor Extractor, camera::dept
   return measure_rgbd(rig, extract, color, depth, memory);
 }
 
-/// Sets `depth` of each keypoint to the depth at the time when its row of the colour image was read. The
-/// depth is that of the pixel at which the moving camera sees the same point in the depth image. @pre all images have
-/// the size of the camera
+/// Sets `depth` of each keypoint to the depth at the time when its row of the colour image was read. The depth is that
+/// of the pixel at which the moving camera sees the same point in the depth image. @pre all images have the size of the
+/// camera
 template <camera::camera_model Camera, camera::depth_source Depth>
 void follow_rows(const camera_rig<Camera>& rig, const frame_motion& m, std::span<keypoint_as_read> keypoints,
                  const Depth& depth) {

@@ -10,7 +10,8 @@
 namespace orbis::slam {
 
 /// A shutter estimated from frames; see `options::estimates_shutter`. Components that the motion does not determine are
-/// 0 in `shutter`, and have a deviation that is large or not finite.
+/// 0 in `shutter`, and have a deviation that is large or not finite. Deviations include errors of the velocity and,
+/// until tracking assumes the value, half of its difference from the assumed value.
 struct shutter_estimate {
   camera::shutter shutter{};  ///< the estimate, with the same read-out for both images
   double read_out = 0.0;      ///< estimated read-out, not yet tested for significance, seconds

@@ -16,6 +16,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <concepts>
@@ -62,8 +63,8 @@ class stopwatch;
 
 }  // namespace detail
 
-/// Tracks the frames of one camera and builds a map of landmarks. Images are not kept; callers that need keyframe
-/// images must store them when `track` returns a keyframe.
+/// Tracks the frames of one camera and builds a map of landmarks. Images are not kept, except the last two depth images
+/// while the shutter is estimated; callers that need keyframe images must store them when `track` returns a keyframe.
 ///
 /// Without threads (the default), `track` does all the work, and the same frames and options give bit-identical
 /// results. With threads (`options::threads`) mapping, loop closing and global adjustment run while frames are tracked.
@@ -206,8 +207,6 @@ class system {
   using frame_type = basic_frame<descriptor_type>;
   using front_end = detail::front_end<Camera, descriptor_type, Matchers>;
   using back_end = detail::back_end<Camera, descriptor_type, Places>;
-  /// Corrects the measurements for the row times of a rolling shutter, once the motion is known.
-
   /// Returns true if the images have the size of the camera and the timestamp is finite.
   template <class... Images>
   [[nodiscard]] bool are_usable(double timestamp, const Images&... images) const {
@@ -226,6 +225,7 @@ class system {
   stereo_memory stereo_;
   image_memory image_;
   camera::depth_clock depth_clock_;
+  std::array<image<float>, 2> read_later_;  ///< the depth images of the last two frames, while the shutter is estimated
   detail::shared_state<Camera, descriptor_type, Places> shared_;
   std::unique_ptr<front_end> front_end_;
   track_state reported_state_ = track_state::not_started;

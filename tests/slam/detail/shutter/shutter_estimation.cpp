@@ -94,6 +94,7 @@ TEST_CASE("Read-out and delay are found from pairs of views, with their deviatio
   CHECK(std::abs(found.shutter.depth_delay - 0.01) < 0.002);
   CHECK(found.read_out_deviation < 0.001);
   CHECK(found.delay_deviation < 0.002);
+  CHECK(found.delay_deviation > 0.1 * found.delay);  // includes the error of the velocity
 }
 
 TEST_CASE("A global shutter is found to be one") {
