@@ -4,10 +4,14 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
+#include <utility>
 
+#include <orbis/camera/depth.hpp>
 #include <orbis/camera/rgbd_frame.hpp>
 #include <orbis/cloud/depth_smoothing.hpp>
+#include <orbis/cloud/flying_pixels.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/image.hpp>
 
@@ -21,16 +25,21 @@ class frame_smoother {
   explicit frame_smoother(const frame_source& source) {
     const double focal = source.camera.model.k().fx;
     options_.steepest = steepest / focal;
+    smear_ = focal * integration;
     if (source.is_stereo() && source.camera.baseline)
-      options_.noise = disparity_noise / (focal * *source.camera.baseline);
+      options_.noise = flying_.noise = disparity_noise / (focal * *source.camera.baseline);
   }
 
-  /// The frame with smoothed depth, in the unit of its depth image. Valid until the next call.
-  [[nodiscard]] const orbis::camera::rgbd_frame& operator()(const orbis::camera::rgbd_frame& frame) {
+  /// The frame with smoothed depth, in the unit of its depth image. Depth that a turning camera smears over an edge is
+  /// removed; `turn`: angular velocity, radians per second; 0 if it is unknown. Valid until the next call.
+  [[nodiscard]] const orbis::camera::rgbd_frame& operator()(const orbis::camera::rgbd_frame& frame, double turn) {
     if (metres_.width() != frame.depth.width() || metres_.height() != frame.depth.height())
       metres_ = orbis::image<float>(frame.depth.width(), frame.depth.height());
     options_.resolution = 1.0 / frame.depth_scale;
-    orbis::cloud::smooth_depth(orbis::seq, frame.depth_metres(), metres_.view(), options_, memory_);
+    flying_.reach = static_cast<int>(std::clamp(std::ceil(smear_ * turn), 2.0, 8.0));
+    orbis::cloud::remove_flying_pixels(orbis::seq, frame.depth_metres(), metres_.view(), flying_, workspace_);
+    orbis::cloud::smooth_depth(orbis::seq, orbis::camera::depth_view<float>{std::as_const(metres_).view()},
+                               metres_.view(), options_, memory_);
     smooth_ = frame;
     constexpr float largest = 65534.0F;  // the largest stored value of a measurement
     const auto scale = static_cast<float>(frame.depth_scale);
@@ -43,6 +52,10 @@ class frame_smoother {
  private:
   static constexpr double steepest = 4.0;          // tangent of the steepest slant of a measured surface: 76 degrees
   static constexpr double disparity_noise = 0.25;  // standard deviation of stereo matching, pixels
+  static constexpr double integration = 0.016;     // seconds in which a depth image is captured, half a frame's time
+  double smear_ = 0.0;                             // pixels, for one radian per second
+  orbis::cloud::flying_pixel_options flying_;
+  orbis::cloud::flying_pixel_workspace workspace_;
   orbis::cloud::depth_smoothing_options options_;
   orbis::image<float> metres_, memory_;
   orbis::camera::rgbd_frame smooth_;

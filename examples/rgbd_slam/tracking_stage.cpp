@@ -132,7 +132,8 @@ void track_frames(slam_system& slam, const frame_source& source, const settings&
     if (is_mapped) source.complete(*frame);
     const orbis::slam::frame_motion motion{found.shutter, found.twist};
     const orbis::camera::rgbd_frame& at_once = is_mapped ? correct(*frame, motion) : *frame;
-    const orbis::camera::rgbd_frame& for_map = is_mapped ? smooth(remove_moving(at_once, slam.last_frame())) : at_once;
+    const orbis::camera::rgbd_frame& for_map =
+        is_mapped ? smooth(remove_moving(at_once, slam.last_frame()), motion.twist.tail<3>().norm()) : at_once;
     if (has_keyframe)
       out.keyframes.add(i, {found.map, *found.keyframe}, &at_once == &*frame ? orbis::slam::frame_motion{} : motion,
                         for_map);
