@@ -30,13 +30,15 @@ class frame_smoother {
       options_.noise = flying_.noise = disparity_noise / (focal * *source.camera.baseline);
   }
 
-  /// The frame with smoothed depth, in the unit of its depth image. Depth that a turning camera smears over an edge is
-  /// removed; `turn`: angular velocity, radians per second; 0 if it is unknown. Valid until the next call.
+  /// The frame with smoothed depth, in the unit of its depth image. Flying pixels are removed and, if the camera turns
+  /// so quickly that it smears depth over edges, all pixels that are on no surface; otherwise, the filter of the cloud
+  /// judges these. `turn`: angular velocity, radians per second; 0 if it is unknown. Valid until the next call.
   [[nodiscard]] const orbis::camera::rgbd_frame& operator()(const orbis::camera::rgbd_frame& frame, double turn) {
     if (metres_.width() != frame.depth.width() || metres_.height() != frame.depth.height())
       metres_ = orbis::image<float>(frame.depth.width(), frame.depth.height());
     options_.resolution = 1.0 / frame.depth_scale;
     flying_.reach = static_cast<int>(std::clamp(std::ceil(smear_ * turn), 2.0, 8.0));
+    options_.min_support = flying_.reach > 2 ? orbis::cloud::depth_smoothing_options{}.min_support : 0.0;
     orbis::cloud::remove_flying_pixels(orbis::seq, frame.depth_metres(), metres_.view(), flying_, workspace_);
     orbis::cloud::smooth_depth(orbis::seq, orbis::camera::depth_view<float>{std::as_const(metres_).view()},
                                metres_.view(), options_, memory_);
