@@ -81,7 +81,7 @@ track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const rgb8> c
   row_reader read = [&](std::span<keypoint_as_read> seen, const frame_motion& m) {
     follow_rows(shared_.rig, m, seen, depth);
   };
-  if (options_.estimates_shutter && shared_.rig.scale_is_known) {
+  if (options_.estimates_shutter) {
     // The image is read again when the next frame has been tracked.
     image<float>& kept = read_later_[front_end_->counters().frames % 2];
     if (kept.width() != depth.width()) kept = image<float>(depth.width(), depth.height());
