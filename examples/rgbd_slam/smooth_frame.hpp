@@ -14,6 +14,7 @@
 #include <orbis/cloud/flying_pixels.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/image.hpp>
+#include <orbis/slam/measure.hpp>
 
 #include "source.hpp"
 
@@ -32,8 +33,10 @@ class frame_smoother {
 
   /// The frame with smoothed depth, in the unit of its depth image. Flying pixels are removed and, if the camera turns
   /// so quickly that it smears depth over edges, all pixels that are on no surface; otherwise, the filter of the cloud
-  /// judges these. `turn`: angular velocity, radians per second; 0 if it is unknown. Valid until the next call.
-  [[nodiscard]] const orbis::camera::rgbd_frame& operator()(const orbis::camera::rgbd_frame& frame, double turn) {
+  /// judges these. `m`: the motion of the camera; zero if it is unknown. Valid until the next call.
+  [[nodiscard]] const orbis::camera::rgbd_frame& operator()(const orbis::camera::rgbd_frame& frame,
+                                                            const orbis::slam::frame_motion& m) {
+    const double turn = m.twist.tail<3>().norm();  // radians per second
     if (metres_.width() != frame.depth.width() || metres_.height() != frame.depth.height())
       metres_ = orbis::image<float>(frame.depth.width(), frame.depth.height());
     options_.resolution = 1.0 / frame.depth_scale;

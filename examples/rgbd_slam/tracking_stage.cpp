@@ -133,7 +133,7 @@ void track_frames(slam_system& slam, const frame_source& source, const settings&
     const orbis::slam::frame_motion motion{found.shutter, found.twist};
     const orbis::camera::rgbd_frame& at_once = is_mapped ? correct(*frame, motion) : *frame;
     const orbis::camera::rgbd_frame& for_map =
-        is_mapped ? smooth(remove_moving(at_once, slam.last_frame()), motion.twist.tail<3>().norm()) : at_once;
+        is_mapped ? smooth(remove_moving(at_once, slam.last_frame()), motion) : at_once;
     if (has_keyframe)
       out.keyframes.add(i, {found.map, *found.keyframe}, &at_once == &*frame ? orbis::slam::frame_motion{} : motion,
                         for_map);
