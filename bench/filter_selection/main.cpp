@@ -11,7 +11,8 @@
 #include <string>
 #include <vector>
 
-#include <orbis/cloud/select-inl.hpp>
+#include <orbis/cloud/select.hpp>
+#include <orbis/cloud/select_by_views.hpp>
 
 #include "../../examples/common/filter_text.hpp"
 #include "heat_map.hpp"

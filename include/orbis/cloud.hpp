@@ -18,6 +18,7 @@
 /// | `ray_evidence.hpp`         | filter: points that the rays of depth images pass through                   |
 /// | `ray_evidence_counter.hpp` | the counts for that filter, accumulated image by image                      |
 /// | `select.hpp`               | automatic selection and application of filters                              |
+/// | `select_by_views.hpp`      | the same, with the depth images that show the cloud                         |
 /// | `sensor_origins.hpp`       | the sensor position for each point                                          |
 /// | `statistical.hpp`          | filter: mean neighbour distance above mu + alpha sigma; also relative to range |
 /// | `view_samples.hpp`         | samples of each depth image, used to compare images with each other         |
@@ -38,6 +39,7 @@
 #include <orbis/cloud/ray_evidence.hpp>
 #include <orbis/cloud/ray_evidence_counter.hpp>
 #include <orbis/cloud/select.hpp>
+#include <orbis/cloud/select_by_views.hpp>
 #include <orbis/cloud/sensor_origins.hpp>
 #include <orbis/cloud/statistical.hpp>
 #include <orbis/cloud/view_samples.hpp>

@@ -7,7 +7,8 @@
 #include <vector>
 
 #include <orbis/cloud/filter_choice.hpp>
-#include <orbis/cloud/select-inl.hpp>
+#include <orbis/cloud/select.hpp>
+#include <orbis/cloud/select_by_views.hpp>
 #include <orbis/core/random.hpp>
 
 #include "cloud/clouds.hpp"

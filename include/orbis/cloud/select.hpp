@@ -2,8 +2,8 @@
 /// @file
 /// Automatic selection of filters: analyses the cloud and returns the choice with its evidence.
 ///
-/// 1. *Views*, if available, take precedence: points that their rays pass through are removed, as are points
-///    measured only by a stray pixel or by a view that contradicts all others.
+/// 1. *Views*, if available (select_by_views.hpp), take precedence: points that their rays pass through are removed, as
+///    are points measured only by a stray pixel or by a view that contradicts all others.
 /// 2. *Density*: the logarithm of a point's mean distance to a few neighbours, minus a reference. The reference is one
 ///    value for all points, a line over the logarithm of the range (a depth camera's points thin out with range), or,
 ///    for clouds of uneven density, the value of the surroundings. Outliers appear as a second population of points
@@ -12,8 +12,6 @@
 /// 3. *Connectivity*: isolated groups of a few points and small clusters far from the surface are removed.
 ///
 /// A step is part of the chosen chain only if it removes points.
-///
-/// The library orbis::compiled contains the selection without views; to pass views, include select-inl.hpp.
 #pragma once
 
 #include <cassert>
@@ -22,11 +20,9 @@
 #include <span>
 #include <vector>
 
-#include <orbis/camera/model.hpp>
 #include <orbis/cloud/detail/point_view.hpp>
 #include <orbis/cloud/filter_chain.hpp>
 #include <orbis/cloud/filter_choice.hpp>
-#include <orbis/cloud/ray_evidence_counter.hpp>
 #include <orbis/cloud/sensor_origins.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
@@ -71,19 +67,6 @@ struct known_ranges {
 };
 
 }  // namespace detail
-
-/// Selects filters from the points and from depth images, from which the cloud was built or which show the same scene.
-/// Returns the points that the chosen filters keep. The images reveal false points in front of their measurements, such
-/// as points on moving objects or from wrong poses, which the density does not reveal.
-///
-/// Deterministic and the same for every policy. `on_progress` counts the views; if it cancels, the chain is empty, the
-/// status is `cancelled`, and all points are kept. O(n log n + views (pixels + n)).
-/// @pre neighbors > 0; ranges is empty or as long as points; views' images have the camera's size; samples, if given,
-/// are from these views
-template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
-[[nodiscard]] automatic_result filter_automatically(const Policy& policy, const Points& points, const Views& views,
-                                                    const Camera& camera, const select_options& options = {},
-                                                    progress on_progress = {});
 
 /// Selects filters from the points, without views. A cloud that is empty or too small to analyse gets an empty chain.
 /// O(n log n).
