@@ -106,6 +106,10 @@ TEST_CASE("Parameters that are not determined well enough are held, or all are f
   const auto usual = calibrate(lens, 60, 1.0, 1);
   REQUIRE(usual.camera);
   CHECK(usual.camera->parameters.size() == 8);
+  CHECK_FALSE(usual.camera->is_complete());
+  const auto complete = calibrate(lens, 60, 1.0, 1, {.needs_all = true});
+  REQUIRE_FALSE(complete.camera);
+  CHECK(complete.camera.error().code == errc::degenerate);
   const auto generous = calibrate(lens, 60, 1.0, 1, {.max_effect = 1e6});
   REQUIRE(generous.camera);
   CHECK(generous.camera->is_complete());

@@ -124,8 +124,12 @@ template <camera::parametric_camera Camera>
   while (!found) {
     auto poses = problem.poses;
     auto points = problem.points;
-    auto tried = optimize::self_calibrate<Camera>(
-        before, poses, points, observations, {.bf = bf, .free = free, .keeps_aspect = options.keeps_aspect}, callback);
+    auto tried = optimize::self_calibrate<Camera>(before, poses, points, observations,
+                                                  {.bf = bf,
+                                                   .free = free,
+                                                   .keeps_aspect = options.keeps_aspect,
+                                                   .relative_tolerance = options.relative_tolerance},
+                                                  callback);
     if (!tried && tried.error().code != errc::degenerate) return fail(tried.error());
     if (tried && by_patches) tried->covariance *= patch_correlation * patch_correlation;
     const auto is_vague = [&](std::uint32_t group) {
@@ -138,7 +142,7 @@ template <camera::parametric_camera Camera>
     }
     // Distortion must not compensate for a fixed focal length: the groups are fixed in order.
     free &= ~*std::find_if(groups.begin(), groups.end(), [&](std::uint32_t group) { return (free & group) != 0; });
-    if (free == 0)
+    if (free == 0 || options.needs_all)
       return fail(errc::degenerate, "calibration",
                   tried ? "the motion of the camera does not determine its parameters" : tried.error().message);
   }

@@ -41,6 +41,9 @@ struct calibration_options {
   /// in their number. With fewer landmarks, the standard deviations of the parameters grow, and more groups exceed
   /// `max_effect`.
   std::size_t max_landmarks = std::numeric_limits<std::size_t>::max();
+  /// Fails with `degenerate`, instead of holding some parameters fixed, if the motion does not determine all of them.
+  bool needs_all = false;
+  double relative_tolerance = 1e-8;  ///< see `optimize::self_calibration_options`
 };
 
 /// Result for one parameter.
@@ -75,9 +78,9 @@ struct calibration : calibration_summary {
 /// observations that did not fit the first camera are missing from the map.
 ///
 /// `rig`: the rig with which the map was built (`make_rig`). @pre options.depth_weight > 0. Errors: `no_data` for a map
-/// without landmarks that two keyframes observe; `degenerate` if the camera motion determines no parameter, or no
-/// observation has depth; `cancelled` if `callback` cancels. Complexity: see `optimize::self_calibrate`, which is
-/// called up to four times.
+/// without landmarks that two keyframes observe; `degenerate` if the camera motion determines no parameter (with
+/// `needs_all`: not all), or no observation has depth; `cancelled` if `callback` cancels. Complexity: see
+/// `optimize::self_calibrate`, which is called up to four times, with `needs_all` once.
 template <feature_descriptor D, calibrated_camera Camera>
 [[nodiscard]] result<calibration<Camera>> calibrate(const basic_map<D>& m, const camera_rig<Camera>& rig,
                                                     const calibration_options& options = {},
