@@ -8,7 +8,6 @@
 #include <orbis/eval/ate.hpp>
 #include <orbis/io/mono_recording.hpp>
 #include <orbis/io/synthetic.hpp>
-#include <orbis/slam/system-inl.hpp>
 #include <orbis/slam/system.hpp>
 
 #include "support/catch.hpp"

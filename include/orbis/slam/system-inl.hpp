@@ -3,12 +3,13 @@
 /// Implementation of system.hpp.
 #pragma once
 
+#include <cassert>
 #include <chrono>
 #include <span>
 #include <string>
 
 #include <orbis/features/descriptor.hpp>
-#include <orbis/features/stereo-inl.hpp>
+#include <orbis/features/stereo.hpp>
 #include <orbis/slam/detail/system/back_end.hpp>
 #include <orbis/slam/detail/tracking/front_end.hpp>
 #include <orbis/slam/ids.hpp>
@@ -95,10 +96,8 @@ track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const rgb8> c
 }
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
-template <class Measure>
-requires std::is_invocable_r_v < basic_frame<descriptor_of_t<Extractor>>,
-const Measure&, const camera_rig<Camera>&,
-    const Extractor& > track_result ORBIS_SLAM_SYSTEM::track_measured(double timestamp, const Measure& measure) {
+track_result ORBIS_SLAM_SYSTEM::track_measured(double timestamp, const measure_function& measure) {
+  assert(measure);
   detail::stopwatch clock;
   front_end_->depth().clear_depth();
   front_end_->patches().set_image({});

@@ -26,7 +26,6 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -119,13 +118,12 @@ class system {
   /// As above, for one image without depth, for a system with `monocular_options`.
   track_result track(double timestamp, image_view<const rgb8> color);
   track_result track(double timestamp, image_view<const std::uint8_t> grey) requires grey_extractor<Extractor>;
-  /// As above, for another kind of sensor: `measure(rig, extract)` creates the frame, like the functions of
-  /// `measure.hpp`, with the depth of each feature, or 0. There is then no depth image for `options::depth_term`, and
-  /// depth is assumed to be measured at the frame's time. With orbis::compiled, include `<orbis/slam/system-inl.hpp>`.
-  template <class Measure>
-  requires std::is_invocable_r_v < basic_frame<descriptor_of_t<Extractor>>,
-  const Measure&, const camera_rig<Camera>&,
-      const Extractor& > track_result track_measured(double timestamp, const Measure& measure);
+  /// Creates a frame, like the functions of `measure.hpp`, with the depth of each feature, or 0.
+  using measure_function =
+      std::function<basic_frame<descriptor_of_t<Extractor>>(const camera_rig<Camera>& rig, const Extractor& extract)>;
+  /// As above, for another kind of sensor. There is no depth image for `options::depth_term`, and depth is assumed to
+  /// be measured at the frame's time. @pre `measure` is not empty
+  track_result track_measured(double timestamp, const measure_function& measure);
 
   /// The state after the last frame.
   [[nodiscard]] track_state state() const;
