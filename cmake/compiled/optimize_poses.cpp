@@ -8,6 +8,7 @@
 #include <orbis/camera/radial_tangential.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/se3.hpp>
+#include <orbis/core/sim3.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/pnp-inl.hpp>
 #include <orbis/optimize/pose_graph-inl.hpp>
@@ -33,13 +34,15 @@ template pose_refinement detail::refine_pose(observations, const camera::radial_
 template pose_refinement detail::refine_pose(observations, const camera::kannala_brandt&, double, const se3&, outliers,
                                              const pose_refinement_options&, const huber&);
 
-using edges = std::span<const pose_graph_edge<se3>>;
-template class pose_graph_solver<se3>;
-template pose_graph_summary pose_graph_solver<se3>::solve_edges(const sequential_policy&, std::span<se3>, edges,
-                                                                const pose_graph_options&, const progress&,
-                                                                detail::no_report&);
-template pose_graph_summary pose_graph_solver<se3>::solve_edges(const parallel_policy&, std::span<se3>, edges,
-                                                                const pose_graph_options&, const progress&,
-                                                                detail::no_report&);
+#define ORBIS_POSE_GRAPH(pose)                                                                                      \
+  template class pose_graph_solver<pose>;                                                                           \
+  template pose_graph_summary pose_graph_solver<pose>::solve_edges(                                                 \
+      const sequential_policy&, std::span<pose>, std::span<const pose_graph_edge<pose>>, const pose_graph_options&, \
+      const progress&, detail::no_report&);                                                                         \
+  template pose_graph_summary pose_graph_solver<pose>::solve_edges(                                                 \
+      const parallel_policy&, std::span<pose>, std::span<const pose_graph_edge<pose>>, const pose_graph_options&,   \
+      const progress&, detail::no_report&);
+ORBIS_POSE_GRAPH(se3)
+ORBIS_POSE_GRAPH(sim3)
 
 }  // namespace orbis::optimize

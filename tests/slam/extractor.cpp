@@ -6,10 +6,14 @@
 #include <cstdint>
 #include <cstdlib>
 #include <type_traits>
+#include <utility>
 
 #include <orbis/camera/any.hpp>
 #include <orbis/camera/pinhole.hpp>
+#include <orbis/features/brute_force-inl.hpp>
+#include <orbis/features/epipolar-inl.hpp>
 #include <orbis/features/orb.hpp>
+#include <orbis/features/windowed-inl.hpp>
 #include <orbis/io/synthetic.hpp>
 #include <orbis/slam/system-inl.hpp>
 #include <orbis/slam/system.hpp>
@@ -71,6 +75,14 @@ static_assert(std::is_same_v<slam::descriptor_of_t<features::orb_extractor>, fea
 static_assert(std::is_same_v<decltype(slam::basic_landmark<histogram>{}.descriptor), histogram>);
 static_assert(slam::tracking_matchers<matchers, histogram> && !slam::tracking_matchers<slam::orb_matchers, histogram>);
 
+// The type of the system follows from the arguments of its constructor.
+struct sparse_extractor {
+  [[nodiscard]] features::features operator()(image_view<const rgb8> image) const;
+};
+using deduced = decltype(slam::rgbd_system{std::declval<camera::pinhole>(), slam::options{},
+                                           std::declval<sparse_extractor>()});
+static_assert(std::is_same_v<deduced, slam::rgbd_system<camera::pinhole, sparse_extractor>>);
+
 // Files hold the descriptors of ORB alone.
 template <class S>
 concept saves_maps = requires(const S& s) {
@@ -102,15 +114,4 @@ TEST_CASE("A system with another descriptor, distance and extractor tracks a rec
   CHECK(slam.landmark_count() > 200);
   const auto valid = test::validate(slam.map());
   CHECK((valid ? "" : valid.error().to_string()) == "");
-}
-
-TEST_CASE("A system takes another extractor by type") {
-  struct sparse_extractor {
-    features::orb_extractor inner{{.max_features = 400}};
-    [[nodiscard]] features::features operator()(image_view<const rgb8> image) const { return inner(image); }
-  };
-  const io::synthetic_recording recorded{{.frames = 10, .seed = 5, .width = 320, .height = 240, .frames_around = 300}};
-  slam::rgbd_system slam{recorded.camera().model, slam::options{}, sparse_extractor{}};
-  for (const auto& f : recorded) CHECK(slam.track(f).tracked());
-  CHECK(slam.map().keyframes().front().size() <= 400);
 }

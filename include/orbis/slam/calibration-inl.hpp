@@ -15,7 +15,7 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/bundle_problem.hpp>
-#include <orbis/optimize/self_calibration-inl.hpp>
+#include <orbis/optimize/self_calibration.hpp>
 #include <orbis/slam/calibration.hpp>
 #include <orbis/slam/detail/mapping/map_bundle.hpp>
 

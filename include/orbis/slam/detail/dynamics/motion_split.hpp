@@ -18,8 +18,8 @@
 #include <orbis/camera/model.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
-#include <orbis/optimize/pnp-inl.hpp>
-#include <orbis/optimize/pose_refinement-inl.hpp>
+#include <orbis/optimize/pnp.hpp>
+#include <orbis/optimize/pose_refinement.hpp>
 #include <orbis/optimize/reprojection.hpp>
 #include <orbis/slam/detail/map/point_observation.hpp>
 #include <orbis/slam/options.hpp>

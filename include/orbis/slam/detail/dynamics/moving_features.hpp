@@ -15,7 +15,7 @@
 #include <orbis/core/types.hpp>
 #include <orbis/features/descriptor.hpp>
 #include <orbis/features/match.hpp>
-#include <orbis/features/windowed-inl.hpp>
+#include <orbis/features/windowed.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/dynamics/motion_split.hpp>
 #include <orbis/slam/detail/map/landmark_search.hpp>

@@ -15,7 +15,7 @@
 #include <orbis/features/project_points.hpp>
 #include <orbis/features/projected.hpp>
 #include <orbis/features/stages.hpp>
-#include <orbis/features/windowed-inl.hpp>
+#include <orbis/features/windowed.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/map/landmark_search.hpp>
 #include <orbis/slam/detail/map/local_map.hpp>

@@ -28,7 +28,7 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/core/sim3.hpp>
 #include <orbis/core/types.hpp>
-#include <orbis/optimize/pose_graph-inl.hpp>
+#include <orbis/optimize/pose_graph.hpp>
 #include <orbis/optimize/pose_graph_problem.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/loops/loop_fusion.hpp>

@@ -28,13 +28,13 @@
 #include <orbis/core/random.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/sim3.hpp>
-#include <orbis/features/brute_force-inl.hpp>
+#include <orbis/features/brute_force.hpp>
 #include <orbis/features/descriptor.hpp>
 #include <orbis/features/match.hpp>
 #include <orbis/features/matcher.hpp>
 #include <orbis/features/stages.hpp>
 #include <orbis/optimize/alignment.hpp>
-#include <orbis/optimize/pose_refinement-inl.hpp>
+#include <orbis/optimize/pose_refinement.hpp>
 #include <orbis/optimize/ransac.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/loops/landmark_snapshot.hpp>

@@ -10,7 +10,7 @@
 #include <orbis/features/descriptor.hpp>
 #include <orbis/features/project_points.hpp>
 #include <orbis/features/projected.hpp>
-#include <orbis/features/windowed-inl.hpp>
+#include <orbis/features/windowed.hpp>
 #include <orbis/slam/landmark.hpp>
 #include <orbis/slam/pyramid_scales.hpp>
 

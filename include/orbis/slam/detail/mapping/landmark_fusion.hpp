@@ -14,7 +14,7 @@
 #include <orbis/features/match.hpp>
 #include <orbis/features/matcher.hpp>
 #include <orbis/features/stages.hpp>
-#include <orbis/features/windowed-inl.hpp>
+#include <orbis/features/windowed.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/map/counter.hpp>
 #include <orbis/slam/detail/map/landmark_search.hpp>

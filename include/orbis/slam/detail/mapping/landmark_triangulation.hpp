@@ -18,7 +18,7 @@
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/features/descriptor.hpp>
-#include <orbis/features/epipolar-inl.hpp>
+#include <orbis/features/epipolar.hpp>
 #include <orbis/features/epipolar_geometry.hpp>
 #include <orbis/features/match.hpp>
 #include <orbis/features/matcher.hpp>

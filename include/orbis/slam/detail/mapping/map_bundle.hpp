@@ -16,7 +16,7 @@
 #include <orbis/core/execution.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
-#include <orbis/optimize/bundle_adjustment-inl.hpp>
+#include <orbis/optimize/bundle_adjustment.hpp>
 #include <orbis/optimize/bundle_problem.hpp>
 #include <orbis/optimize/reprojection.hpp>
 #include <orbis/optimize/robust_loss.hpp>

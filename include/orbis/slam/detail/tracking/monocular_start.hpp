@@ -19,7 +19,7 @@
 #include <orbis/features/match.hpp>
 #include <orbis/features/matcher.hpp>
 #include <orbis/features/stages.hpp>
-#include <orbis/features/windowed-inl.hpp>
+#include <orbis/features/windowed.hpp>
 #include <orbis/optimize/two_view.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/extractor.hpp>

@@ -16,8 +16,8 @@
 #include <orbis/features/match.hpp>
 #include <orbis/features/matcher.hpp>
 #include <orbis/features/project_points.hpp>
-#include <orbis/optimize/pnp-inl.hpp>
-#include <orbis/optimize/pose_refinement-inl.hpp>
+#include <orbis/optimize/pnp.hpp>
+#include <orbis/optimize/pose_refinement.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/dynamics/moving_features.hpp>
 #include <orbis/slam/detail/map/landmark_search.hpp>
