@@ -70,6 +70,8 @@ TEST_CASE("A walk through a synthetic room is tracked without a lost frame and w
     CHECK(r.tracked());
     CHECK(r.state == slam::track_state::tracking);
     CHECK(r.inliers >= 20);
+    CHECK(r.timings.features_ms > 0.0);
+    CHECK(r.timings.tracking_ms > 0.0);
     if (r.keyframe) CHECK(*r.keyframe == keyframes++);
   }
   CHECK(slam.counters().frames == recorded.size());
