@@ -3,8 +3,7 @@
 /// Implementation of occupancy_octree.hpp.
 #pragma once
 
-#include <orbis/octree/detail/mark/point_integrator.hpp>
-#include <orbis/octree/detail/mark/scan_buffers.hpp>
+#include <orbis/octree/detail/mark/mark_scan.hpp>
 #include <orbis/octree/detail/storage/apply_scan.hpp>
 #include <orbis/octree/detail/storage/palette_kernels.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
@@ -33,10 +32,10 @@ integration_summary occupancy_octree<Model>::integrate_points(const parallel_pol
                                                               const detail::float3& origin,
                                                               const integration_options& options) {
   begin_change();
-  detail::point_integrator& marker = scratch_.get<detail::scan_buffers>().points;
-  integration_summary summary =
-      marker.mark(policy, grid_, points, origin, options, detail::saturated_in<Model>(store_));
-  detail::apply_scan<Model>(store_, marker.masks(), summary, track_.on ? &track_.log : nullptr);
+  integration_summary summary;
+  const detail::scan_masks& masks = detail::mark_points(policy, scratch_, grid_, points, origin, options, summary,
+                                                        detail::saturated_in<Model>(store_));
+  detail::apply_scan<Model>(store_, masks, summary, track_.on ? &track_.log : nullptr);
   return summary;
 }
 
@@ -45,9 +44,8 @@ integration_summary occupancy_octree<Model>::integrate_depth(const parallel_poli
                                                              const detail::depth_scan& scan, const se3& T_world_camera,
                                                              const integration_options& options) {
   begin_change();
-  detail::scan_buffers& buffers = scratch_.get<detail::scan_buffers>();
   integration_summary summary;
-  const detail::scan_masks& masks = detail::mark_depth(policy, buffers, grid_, scan, T_world_camera, options, summary,
+  const detail::scan_masks& masks = detail::mark_depth(policy, scratch_, grid_, scan, T_world_camera, options, summary,
                                                        detail::saturated_in<Model>(store_));
   detail::apply_scan<Model>(store_, masks, summary, track_.on ? &track_.log : nullptr);
   return summary;

@@ -4,14 +4,37 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 
 #include <orbis/core/inline.hpp>
+#include <orbis/octree/detail/mark/mark_scan.hpp>
 #include <orbis/octree/detail/mark/scan_buffers.hpp>
 #include <orbis/octree/detail/storage/palette_kernels.hpp>
 #include <orbis/octree/detail/storage/scan_masks.hpp>
 #include <orbis/octree/scan.hpp>
 
 namespace orbis::octree {
+
+namespace detail {
+
+template <class Policy>
+const scan_masks& mark_points(const Policy& policy, scan_scratch& scratch, const voxel_grid& grid,
+                              const point_view& points, const std::array<float, 3>& origin,
+                              const integration_options& options, integration_summary& summary,
+                              const saturated_voxels& saturated) {
+  point_integrator& marker = scratch.get<scan_buffers>().points;
+  summary = marker.mark(policy, grid, points, origin, options, saturated);
+  return marker.masks();
+}
+
+template <class Policy>
+const scan_masks& mark_depth(const Policy& policy, scan_scratch& scratch, const voxel_grid& grid,
+                             const depth_scan& scan, const se3& T_world_camera, const integration_options& options,
+                             integration_summary& summary, const saturated_voxels& saturated) {
+  return mark_depth(policy, scratch.get<scan_buffers>(), grid, scan, T_world_camera, options, summary, saturated);
+}
+
+}  // namespace detail
 
 ORBIS_INLINE void scan::add(const detail::scan_brick& b) {
   part p{.name = b.name, .first = static_cast<std::uint32_t>(words_.size())};
@@ -54,9 +77,7 @@ integration_summary scan_marker::mark_depth(const Policy& policy, const voxel_gr
                                             const detail::depth_scan& image, const se3& T_world_camera,
                                             const integration_options& options, scan& voxels) {
   integration_summary summary;
-  const detail::scan_masks& masks =
-      detail::mark_depth(policy, scratch_.get<detail::scan_buffers>(), grid, image, T_world_camera, options, summary);
-  pack(masks, voxels, summary);
+  pack(detail::mark_depth(policy, scratch_, grid, image, T_world_camera, options, summary), voxels, summary);
   return summary;
 }
 
@@ -64,9 +85,8 @@ template <class Policy>
 integration_summary scan_marker::mark_points(const Policy& policy, const voxel_grid& grid,
                                              const detail::point_view& points, const std::array<float, 3>& origin,
                                              const integration_options& options, scan& voxels) {
-  detail::point_integrator& marker = scratch_.get<detail::scan_buffers>().points;
-  integration_summary summary = marker.mark(policy, grid, points, origin, options);
-  pack(marker.masks(), voxels, summary);
+  integration_summary summary;
+  pack(detail::mark_points(policy, scratch_, grid, points, origin, options, summary), voxels, summary);
   return summary;
 }
 

@@ -8,7 +8,7 @@
 #include <orbis/octree/detail/storage/apply_scan.hpp>
 #include <orbis/octree/detail/storage/brick.hpp>
 #include <orbis/octree/occupancy_octree-inl.hpp>
-#include <orbis/octree/scan-inl.hpp>
+#include <orbis/octree/scan.hpp>
 #include <orbis/octree/scan_history.hpp>
 #include <orbis/octree/sensor_model.hpp>
 
