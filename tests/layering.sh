@@ -24,6 +24,9 @@ while IFS=: read -r file line text; do
   target=${included%%/*}
   target=${target%.hpp}
   [[ $target == "$component" ]] && continue
+  # Programs that link orbis::compiled would compile what it contains.
+  [[ $included == *-inl.hpp && $file =~ /detail/|-inl\.hpp$ ]] &&
+    complain "$file:$line: includes the implementation $included instead of its declaration"
   if [[ $component == core ]]; then
     complain "$file:$line: core includes $included"
   elif [[ $component == camera ]]; then

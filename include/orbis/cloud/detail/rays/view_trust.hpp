@@ -18,7 +18,7 @@
 #include <orbis/cloud/detail/rays/depth_rows.hpp>
 #include <orbis/cloud/detail/rays/take_depth_windows.hpp>
 #include <orbis/cloud/detail/select/log_density.hpp>
-#include <orbis/cloud/ray_evidence_counter-inl.hpp>
+#include <orbis/cloud/ray_evidence_counter.hpp>
 #include <orbis/cloud/view_samples.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/image.hpp>

@@ -17,7 +17,7 @@
 #include <orbis/cloud/detail/rays/view_trust.hpp>
 #include <orbis/cloud/filter_chain.hpp>
 #include <orbis/cloud/filter_choice.hpp>
-#include <orbis/cloud/ray_evidence-inl.hpp>
+#include <orbis/cloud/ray_evidence.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
 
