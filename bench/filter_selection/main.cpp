@@ -12,7 +12,7 @@
 #include <vector>
 
 #include <orbis/cloud/select.hpp>
-#include <orbis/cloud/select_by_views.hpp>
+#include <orbis/cloud/select_by_views-inl.hpp>
 
 #include "../../examples/common/filter_text.hpp"
 #include "heat_map.hpp"

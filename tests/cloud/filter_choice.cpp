@@ -8,7 +8,7 @@
 
 #include <orbis/cloud/filter_choice.hpp>
 #include <orbis/cloud/select.hpp>
-#include <orbis/cloud/select_by_views.hpp>
+#include <orbis/cloud/select_by_views-inl.hpp>
 #include <orbis/core/random.hpp>
 
 #include "cloud/clouds.hpp"

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include <orbis/camera/any.hpp>
-#include <orbis/cloud/select_by_views.hpp>
+#include <orbis/cloud/select_by_views-inl.hpp>
 #include <orbis/cloud/view_samples.hpp>
 
 #include "cloud/room_outliers.hpp"

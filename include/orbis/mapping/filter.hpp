@@ -21,7 +21,7 @@
 #include <orbis/cloud/radius.hpp>
 #include <orbis/cloud/ray_evidence-inl.hpp>
 #include <orbis/cloud/select.hpp>
-#include <orbis/cloud/select_by_views.hpp>
+#include <orbis/cloud/select_by_views-inl.hpp>
 #include <orbis/cloud/statistical.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/point.hpp>
