@@ -24,7 +24,7 @@ while IFS=: read -r file line text; do
   target=${included%%/*}
   target=${target%.hpp}
   [[ $target == "$component" ]] && continue
-  # Programs that link orbis::compiled would compile what it contains.
+  # An -inl header makes programs that link orbis::compiled compile code that the library already contains.
   [[ $included == *-inl.hpp && $file =~ /detail/|-inl\.hpp$ ]] &&
     complain "$file:$line: includes the implementation $included instead of its declaration"
   if [[ $component == core ]]; then

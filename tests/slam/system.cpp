@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -66,7 +67,10 @@ TEST_CASE("A walk through a synthetic room is tracked without a lost frame and w
   CHECK(slam.state() == slam::track_state::not_started);
   std::uint32_t keyframes = 0;
   for (const auto& f : recorded) {
+    const auto begin = std::chrono::steady_clock::now();
     const auto r = slam.track(f);
+    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - begin;
+    CHECK(r.timings.features_ms + r.timings.tracking_ms + r.timings.mapping_ms <= took.count());
     CHECK(r.tracked());
     CHECK(r.state == slam::track_state::tracking);
     CHECK(r.inliers >= 20);

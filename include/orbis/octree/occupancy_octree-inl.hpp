@@ -7,7 +7,7 @@
 #include <orbis/octree/detail/storage/apply_scan.hpp>
 #include <orbis/octree/detail/storage/palette_kernels.hpp>
 #include <orbis/octree/occupancy_octree.hpp>
-#include <orbis/octree/scan.hpp>
+#include <orbis/octree/scan.hpp>  // in header-only use, also the definitions of mark_scan.hpp
 
 namespace orbis::octree {
 

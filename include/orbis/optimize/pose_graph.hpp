@@ -35,8 +35,8 @@ class pose_graph_descent;
 /// residual, for example `pose_graph_solver<se3, huber, levenberg_marquardt> solver{huber{1.0}}`. Memory is reused:
 /// solving a graph with the same edges again allocates nothing (with `orbis::seq`). Not thread-safe.
 ///
-/// The library orbis::compiled contains it for `se3` graphs with the default policies and `pose_graph_edge`, without a
-/// report; for other arguments include pose_graph-inl.hpp.
+/// The library orbis::compiled contains it for `se3` and `sim3` graphs with the default policies and `pose_graph_edge`,
+/// without a report; for other arguments include pose_graph-inl.hpp.
 template <class T, robust_loss Loss = trivial, damping_policy Damping = dogleg,
           between_factor<T> Between = default_between_t<T>>
 class pose_graph_solver {

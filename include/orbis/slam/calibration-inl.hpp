@@ -144,7 +144,9 @@ template <camera::parametric_camera Camera>
     free &= ~*std::find_if(groups.begin(), groups.end(), [&](std::uint32_t group) { return (free & group) != 0; });
     if (free == 0 || options.needs_all)
       return fail(errc::degenerate, "calibration",
-                  tried ? "the motion of the camera does not determine its parameters" : tried.error().message);
+                  !tried      ? tried.error().message
+                  : free != 0 ? "the motion of the camera does not determine all of its parameters"
+                              : "the motion of the camera does not determine its parameters");
   }
   calibration<Camera> out{{{},
                            problem.poses.size(),

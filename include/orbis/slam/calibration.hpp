@@ -41,9 +41,10 @@ struct calibration_options {
   /// in their number. With fewer landmarks, the standard deviations of the parameters grow, and more groups exceed
   /// `max_effect`.
   std::size_t max_landmarks = std::numeric_limits<std::size_t>::max();
-  /// Fails with `degenerate`, instead of holding some parameters fixed, if the motion does not determine all of them.
+  /// True if a group above `max_effect` is an error (`degenerate`) instead of being held fixed.
   bool needs_all = false;
-  double relative_tolerance = 1e-8;  ///< see `optimize::self_calibration_options`
+  /// The optimisation ends when a step reduces the cost by less than this fraction.
+  double relative_tolerance = 1e-8;
 };
 
 /// Result for one parameter.

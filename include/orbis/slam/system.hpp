@@ -73,7 +73,9 @@ class stopwatch;
 ///
 /// Template parameters: the camera model; the extractor, which determines the descriptor type; the matchers for
 /// tracking; place recognition. orbis::compiled contains the system for `camera::any_camera` and the default
-/// components; a program that links it and replaces a component must include `<orbis/slam/system-inl.hpp>`.
+/// components. A program that links it and replaces a component includes `<orbis/slam/system-inl.hpp>`; for a camera
+/// other than `any_camera` and `pinhole`, also `pose_refinement-inl.hpp`, `pnp-inl.hpp` and
+/// `bundle_adjustment-inl.hpp` of `optimize`.
 template <camera::camera_model Camera, feature_extractor Extractor = features::orb_extractor,
           tracking_matchers<descriptor_of_t<Extractor>> Matchers = orb_matchers,
           place_recognizer<descriptor_of_t<Extractor>> Places = bag_of_words_places>
@@ -83,6 +85,9 @@ class system {
   using atlas_type = basic_atlas<descriptor_type>;
   using map_type = basic_map<descriptor_type>;
   using revision_type = pose_revision;
+  /// A function that creates a frame, as those of `measure.hpp` do, with the depth of each feature, or 0.
+  using measure_function =
+      std::function<basic_frame<descriptor_type>(const camera_rig<Camera>& rig, const Extractor& extract)>;
 
   /// Creates a system with an extractor built from `settings.features` and default place recognition.
   explicit system(Camera camera, const options& settings = {}) requires
@@ -118,9 +123,6 @@ class system {
   /// As above, for one image without depth, for a system with `monocular_options`.
   track_result track(double timestamp, image_view<const rgb8> color);
   track_result track(double timestamp, image_view<const std::uint8_t> grey) requires grey_extractor<Extractor>;
-  /// Creates a frame, like the functions of `measure.hpp`, with the depth of each feature, or 0.
-  using measure_function =
-      std::function<basic_frame<descriptor_of_t<Extractor>>(const camera_rig<Camera>& rig, const Extractor& extract)>;
   /// As above, for another kind of sensor. There is no depth image for `options::depth_term`, and depth is assumed to
   /// be measured at the frame's time. @pre `measure` is not empty
   track_result track_measured(double timestamp, const measure_function& measure);
