@@ -46,7 +46,7 @@ std::optional<focal_doubt> find_doubt(const orbis::slam::map& map, const orbis::
   constexpr std::size_t few = 8;  // keyframes
   if (map.keyframes().size() < few) return std::nullopt;
   const orbis::slam::calibration_options small{
-      .max_keyframes = 60, .max_landmarks = 1500, .needs_all = true, .relative_tolerance = 1e-4};
+      .max_keyframes = 60, .max_landmarks = 1500, .needs_all = true, .relative_tolerance = 1e-6};
   const auto as_given = orbis::slam::calibrate(map, orbis::slam::make_rig(camera, options), small, go_on);
   auto doubt = as_given ? find_doubt(as_given->parameters) : std::nullopt;
   if (!doubt || camera.get_if<orbis::camera::pinhole>() == nullptr) return doubt;
