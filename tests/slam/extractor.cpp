@@ -136,3 +136,11 @@ TEST_CASE("A system with another camera, descriptor, distance and extractor trac
   const auto valid = test::validate(slam.map());
   CHECK((valid ? "" : valid.error().to_string()) == "");
 }
+
+TEST_CASE("A system takes its features from the extractor that it is given, not from its options") {
+  const io::synthetic_recording recorded{{.frames = 10, .seed = 5, .width = 320, .height = 240, .frames_around = 300}};
+  system_type slam{own_camera{camera::pinhole{recorded.camera().model.k()}}, slam::options{},
+                   histogram_extractor{features::orb_extractor{{.max_features = 400}}}};
+  for (const auto& f : recorded) CHECK(slam.track(f).tracked());
+  CHECK(slam.map().keyframes().front().size() <= 400);
+}

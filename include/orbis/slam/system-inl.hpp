@@ -4,13 +4,13 @@
 #pragma once
 
 #include <cassert>
-#include <chrono>
 #include <span>
 #include <string>
 
 #include <orbis/features/descriptor.hpp>
 #include <orbis/features/stereo.hpp>
 #include <orbis/slam/detail/system/back_end.hpp>
+#include <orbis/slam/detail/system/stopwatch.hpp>
 #include <orbis/slam/detail/tracking/front_end.hpp>
 #include <orbis/slam/ids.hpp>
 #include <orbis/slam/map-inl.hpp>
@@ -18,23 +18,6 @@
 #include <orbis/slam/system.hpp>
 
 namespace orbis::slam {
-namespace detail {
-
-/// Measures the time between calls to `lap`.
-class stopwatch {
- public:
-  /// Sets `milliseconds` to the time since the last call, or since construction.
-  void lap(double& milliseconds) {
-    const auto now = std::chrono::steady_clock::now();
-    milliseconds = std::chrono::duration<double, std::milli>(now - last_).count();
-    last_ = now;
-  }
-
- private:
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-};
-
-}  // namespace detail
 
 #define ORBIS_SLAM_SYSTEM_TEMPLATE                                    \
   template <camera::camera_model Camera, feature_extractor Extractor, \
