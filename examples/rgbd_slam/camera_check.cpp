@@ -51,7 +51,7 @@ std::optional<focal_doubt> find_doubt(const orbis::slam::map& map, const orbis::
   auto doubt = as_given ? find_doubt(as_given->parameters) : std::nullopt;
   if (!doubt || camera.get_if<orbis::camera::pinhole>() == nullptr) return doubt;
   const auto lens = compare_lens(map, camera, *as_given, options, small, go_on);
-  if (!lens || !lens->is_determined || lens->lens_rms < clearly * lens->pinhole_rms) return std::nullopt;
+  if (!lens || lens->lens_rms < clearly * lens->pinhole_rms) return std::nullopt;
   doubt->is_sure = !lens->has_distortion();
   return doubt;
 }
