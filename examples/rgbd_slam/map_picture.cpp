@@ -16,7 +16,6 @@ using orbis::rgb8;
 using orbis::vec3;
 
 constexpr int oversampling = 2;
-constexpr rgb8 paper{250, 250, 249};
 
 /// A pinhole camera that looks along `forward`; x right, y down.
 struct eye {

@@ -21,9 +21,6 @@ using orbis::octree::occupancy;
 constexpr rgb8 dark{28, 32, 40}, nothing{205, 206, 208};
 constexpr rgb8 white{255, 255, 255}, costly{250, 190, 140}, too_near{235, 150, 120};  // on the floor
 constexpr rgb8 at_obstacle{120, 60, 140}, far_off{235, 245, 250};                     // in the slice
-const cv::Scalar start_color{22, 140, 80};
-
-cv::Scalar on_sheet(rgb8 c) { return {static_cast<double>(c.r), static_cast<double>(c.g), static_cast<double>(c.b)}; }
 
 rgb8 mixed(rgb8 a, rgb8 b, double t) {
   const auto byte = [&](std::uint8_t u, std::uint8_t v) {
@@ -133,8 +130,8 @@ orbis::result<void> write_navigation_picture(const navigation_picture& what, con
     a.frame(title, "x, m", "y, m");
     s.paste(picture, static_cast<int>(x), static_cast<int>(top));
     vec2 entry{x, top + height + 66};
-    for (const meaning& m : colors) entry = s.legend(entry, on_sheet(m.color), m.text);
-    s.legend(s.legend(entry, on_sheet(dark), "occupied"), on_sheet(nothing), "unknown");
+    for (const meaning& m : colors) entry = s.legend(entry, m.color, m.text);
+    s.legend(s.legend(entry, dark, "occupied"), nothing, "unknown");
     if (!has_path || what.path.empty()) return;
     s.legend(s.legend(s.legend({x, entry.y() + 20}, start_color, "start"), error_color, "goal"), estimate_color,
              "path");

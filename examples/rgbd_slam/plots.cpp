@@ -76,8 +76,8 @@ orbis::result<void> write_trajectory_picture(const results& r, const view_frame&
     const vec3 v = frame.T_view_world * k.T_world_camera.translation();
     s.dot(plan.place(v.x(), v.y()), estimate_color, 2.6);
   }
-  s.dot(plan.place(above.front().x(), above.front().y()), {22, 140, 80}, 5.5);
-  s.text("start", plan.place(above.front().x(), above.front().y()) + vec2(9, -7), {22, 140, 80}, 12);
+  s.dot(plan.place(above.front().x(), above.front().y()), start_color, 5.5);
+  s.text("start", plan.place(above.front().x(), above.front().y()) + vec2(9, -7), start_color, 12);
 
   const axes::range time = t.padded(0.0, 0.1);
   axes profile{s, 830, 125, 610, compared ? 260.0 : 630.0, time, z.padded(0.1, 0.1), false};
@@ -96,10 +96,10 @@ orbis::result<void> write_trajectory_picture(const results& r, const view_frame&
 }
 
 orbis::result<void> write_map_picture(const std::string& name, const std::string& title, const tree_numbers& numbers,
-                                      const std::vector<voxel>& voxels, bool colors, const results& r,
-                                      const view_frame& frame) {
+                                      const std::vector<voxel>& voxels, const orbis::image<orbis::rgb8>& aslant,
+                                      const results& r, const view_frame& frame) {
   sheet s{1500, 820};
-  s.paste(draw_aslant(voxels, r.map->voxels, frame, colors ? coloring::camera : coloring::height, 880, 700), 20, 100);
+  s.paste(aslant, 20, 100);
   const view_from_above above = draw_from_above(voxels, r.map->voxels, frame, coloring::height, 560, 620);
   s.paste(above.picture, 920, 130);
   s.text(title, {60, 44}, ink, 19, 0.0, true);
@@ -112,10 +112,10 @@ orbis::result<void> write_map_picture(const std::string& name, const std::string
   s.text(buffer, {60, 90}, faint, 13);
   s.text("from above, by height", {1200, 118}, faint, 12, 0.5);
   std::snprintf(buffer, sizeof buffer, "%.1f m", frame.cut);
-  for (int i = 0; i != 200; ++i) {
-    const orbis::rgb8 c = height_color(i / 199.0);
-    s.line({1180.0 + i, 785}, {1180.0 + i, 793}, cv::Scalar(c.r, c.g, c.b), 1.0);
-  }
+  orbis::image<orbis::rgb8> scale(200, 9);
+  for (int y = 0; y != scale.height(); ++y)
+    for (int x = 0; x != scale.width(); ++x) scale(x, y) = height_color(x / 199.0);
+  s.paste(scale, 1180, 785);
   add_frame_note(s, r, frame);
   s.text("height 0", {1172, 794}, faint, 11, 1.0);
   s.text(buffer, {1388, 794}, faint, 11);
@@ -128,9 +128,10 @@ orbis::result<void> write_map_picture(const std::string& name, const std::string
 }
 
 /// The octree before and after the filter, side by side in the same view, with the sizes below.
-orbis::result<void> write_filter_picture(const results& r, const view_frame& frame) {
+orbis::result<void> write_filter_picture(const results& r, const view_frame& frame,
+                                         const orbis::image<orbis::rgb8>& before,
+                                         const orbis::image<orbis::rgb8>& after) {
   const map_results& m = *r.map;
-  const coloring how = m.cloud.has_colors() ? coloring::camera : coloring::height;
   sheet s{1500, 820};
   s.text(r.title + ": the octree before and after the filter", {60, 44}, ink, 19, 0.0, true);
   s.text("filter: " + m.filter_mode + ", removed " + removed_text(m), {60, 70}, faint, 13);
@@ -138,17 +139,17 @@ orbis::result<void> write_filter_picture(const results& r, const view_frame& fra
     s.text("people and other moving objects, " + count_text(m.moving_pixels) + " pixels of " +
                count_text(m.moving_keyframes) + " keyframes, were removed beforehand",
            {60, 88}, faint, 13);
-  const auto panel = [&](int x, const std::string& name, const std::vector<voxel>& voxels, const tree_numbers& numbers,
-                         std::size_t points, std::uintmax_t bytes) {
-    s.paste(draw_aslant(voxels, m.voxels, frame, how, 720, 600), x, 122);
+  const auto panel = [&](int x, const std::string& name, const orbis::image<orbis::rgb8>& aslant,
+                         const tree_numbers& numbers, std::size_t points, std::uintmax_t bytes) {
+    s.paste(aslant, x, 136, 720);
     s.text(name, {x + 360.0, 116}, ink, 14, 0.5, true);
     s.text("cloud: " + count_text(points) + " points, " + bytes_text(bytes), {x + 360.0, 746}, ink, 13, 0.5);
     s.text("octree: " + count_text(numbers.leaves) + " leaves, " + count_text(numbers.occupied) + " occupied, " +
                bytes_text(numbers.bt_bytes) + " as .bt",
            {x + 360.0, 770}, ink, 13, 0.5);
   };
-  panel(20, "before", m.voxels_unfiltered, m.unfiltered, m.cloud.size(), m.cloud_bytes);
-  panel(760, "after", m.voxels, m.filtered, m.kept.size(), m.filtered_bytes);
+  panel(20, "before", before, m.unfiltered, m.cloud.size(), m.cloud_bytes);
+  panel(760, "after", after, m.filtered, m.kept.size(), m.filtered_bytes);
   add_frame_note(s, r, frame);
   return s.write(r.folder / "filter.png");
 }
@@ -160,13 +161,16 @@ orbis::result<void> write_pictures(const results& r, const view_frame& frame) {
   if (auto done = write_trajectory_picture(r, frame); !done) return done;
   if (!r.map) return {};
   const map_results& m = *r.map;
-  const bool colors = m.cloud.has_colors();
+  const auto draw = [&](const std::vector<voxel>& voxels) {
+    return draw_aslant(voxels, m.voxels, frame, m.cloud.has_colors() ? coloring::camera : coloring::height, 880, 700);
+  };
+  const orbis::image<orbis::rgb8> before = draw(m.voxels_unfiltered), after = draw(m.voxels);
   if (auto done = write_map_picture("map_unfiltered.png", r.title + ": the map before the filter", m.unfiltered,
-                                    m.voxels_unfiltered, colors, r, frame);
+                                    m.voxels_unfiltered, before, r, frame);
       !done)
     return done;
-  if (auto done = write_filter_picture(r, frame); !done) return done;
-  return write_map_picture("map.png", r.title + ": the map", m.filtered, m.voxels, colors, r, frame);
+  if (auto done = write_filter_picture(r, frame, before, after); !done) return done;
+  return write_map_picture("map.png", r.title + ": the map", m.filtered, m.voxels, after, r, frame);
 }
 
 }  // namespace app

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <limits>
@@ -19,67 +20,123 @@
 #include <orbis/core/types.hpp>
 #include <orbis/io/png.hpp>
 
+#include "view_frame.hpp"
+
 namespace app {
 
-inline constexpr int zoom = 2;  // everything is drawn at twice the size and scaled down
+inline constexpr orbis::rgb8 ink{28, 32, 40}, faint{150, 155, 163}, grid{228, 230, 234};
+inline constexpr orbis::rgb8 truth_color{150, 155, 163}, estimate_color{37, 99, 235}, error_color{200, 60, 50},
+    start_color{22, 140, 80};
 
-inline const cv::Scalar ink{28, 32, 40}, faint{150, 155, 163}, grid{228, 230, 234}, truth_color{150, 155, 163},
-    estimate_color{37, 99, 235}, error_color{200, 60, 50};
-
-/// A drawing surface; coordinates are pixels of the final picture.
+/// A drawing surface; coordinates are pixels. What is drawn may extend beyond the surface.
 class sheet {
  public:
-  sheet(int width, int height) : pixels_(height * zoom, width * zoom, CV_8UC3, cv::Scalar(250, 250, 249)) {}
+  sheet(int width, int height) : pixels_(width, height, paper) {}
 
-  void line(const orbis::vec2& a, const orbis::vec2& b, const cv::Scalar& color, double width = 1.0) {
-    cv::line(pixels_, at(a), at(b), color, std::max(1, static_cast<int>(width * zoom)), cv::LINE_AA, 4);
+  void line(const orbis::vec2& a, const orbis::vec2& b, orbis::rgb8 color, double width = 1.0) {
+    curve({a, b}, color, width);
   }
-  void dot(const orbis::vec2& p, const cv::Scalar& color, double radius) {
-    cv::circle(pixels_, at(p), static_cast<int>(radius * zoom * 16), color, cv::FILLED, cv::LINE_AA, 4);
+  /// Draws a line from each point to the next.
+  void curve(const std::vector<orbis::vec2>& points, orbis::rgb8 color, double width) {
+    if (points.size() < 2) return;
+    orbis::vec2 low = points.front(), high = low;
+    for (const orbis::vec2& p : points) {
+      low = low.cwiseMin(p);
+      high = high.cwiseMax(p);
+    }
+    const orbis::vec2 margin = orbis::vec2::Constant(width + 1);
+    draw(low - margin, high + margin, color, [&](cv::Mat& fine, const orbis::vec2& origin) {
+      for (std::size_t i = 1; i != points.size(); ++i)
+        cv::line(fine, at(points[i - 1] - origin), at(points[i] - origin), 255,
+                 std::max(1, static_cast<int>(width * zoom)), cv::LINE_AA, fraction_bits);
+    });
+  }
+  void dot(const orbis::vec2& p, orbis::rgb8 color, double radius) {
+    const orbis::vec2 margin = orbis::vec2::Constant(radius + 1);
+    draw(p - margin, p + margin, color, [&](cv::Mat& fine, const orbis::vec2& origin) {
+      cv::circle(fine, at(p - origin), static_cast<int>(radius * zoom * (1 << fraction_bits)), 255, cv::FILLED,
+                 cv::LINE_AA, fraction_bits);
+    });
   }
   /// `align`: 0: the text begins at `p`; 0.5: it is centred at `p`; 1: it ends at `p`.
-  void text(const std::string& what, const orbis::vec2& p, const cv::Scalar& color = ink, double size = 13.0,
+  void text(const std::string& what, const orbis::vec2& p, orbis::rgb8 color = ink, double size = 13.0,
             double align = 0.0, bool bold = false) {
-    const cv::Point from(static_cast<int>((p.x() - align * text_width(what, size, bold)) * zoom),
-                         static_cast<int>(p.y() * zoom));
-    cv::putText(pixels_, what, from, cv::FONT_HERSHEY_SIMPLEX, font_scale(size), color, font_thickness(bold),
-                cv::LINE_AA);
+    const orbis::vec2 extent = text_size(what, size, bold), from = p - orbis::vec2(align * extent.x(), 0.0);
+    draw(from - orbis::vec2(2.0, extent.y() + 2.0), from + orbis::vec2(extent.x() + 2.0, size), color,
+         [&](cv::Mat& fine, const orbis::vec2& origin) {
+           const orbis::vec2 begin = (from - origin) * zoom;
+           cv::putText(fine, what, {static_cast<int>(begin.x()), static_cast<int>(begin.y())}, cv::FONT_HERSHEY_SIMPLEX,
+                       font_scale(size), 255, font_thickness(bold), cv::LINE_AA);
+         });
   }
   /// Draws a legend entry that begins at `p`; returns the start of the next entry.
-  orbis::vec2 legend(const orbis::vec2& p, const cv::Scalar& color, const std::string& meaning) {
+  orbis::vec2 legend(const orbis::vec2& p, orbis::rgb8 color, const std::string& meaning) {
     constexpr double radius = 5.0, size = 11.5, to_text = 16.0, apart = 20.0;
     const orbis::vec2 middle = p + orbis::vec2(radius, -4.0);
     dot(middle, faint, radius + 0.5);  // a rim makes almost white colours visible
     dot(middle, color, radius);
     text(meaning, p + orbis::vec2(to_text, 0.0), ink, size);
-    return p + orbis::vec2(to_text + text_width(meaning, size) + apart, 0.0);
+    return p + orbis::vec2(to_text + text_size(meaning, size).x() + apart, 0.0);
   }
-  void paste(const orbis::image<orbis::rgb8>& picture, int x, int y) {
-    const cv::Mat from(picture.height(), picture.width(), CV_8UC3,
-                       const_cast<orbis::rgb8*>(picture.data()));  // only read
-    cv::Mat to = pixels_(cv::Rect(x * zoom, y * zoom, picture.width() * zoom, picture.height() * zoom));
-    cv::resize(from, to, to.size(), 0, 0, cv::INTER_NEAREST);
+  /// @pre the picture lies within the surface
+  void paste(const orbis::image<orbis::rgb8>& picture, int x, int y) { paste(picture, x, y, picture.width()); }
+  /// Pastes a picture that is scaled to a width. @pre it then lies within the surface
+  void paste(const orbis::image<orbis::rgb8>& picture, int x, int y, int width) {
+    const cv::Mat from = as_mat(picture);
+    cv::Mat to = as_mat(pixels_)({x, y, width, picture.height() * width / picture.width()});
+    cv::resize(from, to, to.size(), 0, 0, cv::INTER_AREA);
   }
   [[nodiscard]] orbis::result<void> write(const std::filesystem::path& path) const {
-    orbis::image<orbis::rgb8> out(pixels_.cols / zoom, pixels_.rows / zoom);
-    cv::Mat small(out.height(), out.width(), CV_8UC3, out.data());
-    cv::resize(pixels_, small, small.size(), 0, 0, cv::INTER_AREA);
-    return orbis::io::write_png(path, out.view());
+    return orbis::io::write_png(path, pixels_.view());
   }
 
  private:
+  static constexpr int zoom = 2;  ///< text and lines are drawn at this scale and averaged
+  static constexpr int fraction_bits = 4;
+
+  /// Draws in one colour between `low` and `high`: `shape(fine, origin)` draws 255 on a black surface, enlarged by
+  /// `zoom`, whose first pixel is `origin`.
+  template <class Shape>
+  void draw(const orbis::vec2& low, const orbis::vec2& high, orbis::rgb8 color, const Shape& shape) {
+    const auto inside = [](double v, int limit) { return static_cast<int>(std::clamp<double>(v, 0.0, limit)); };
+    const int left = inside(std::floor(low.x()), pixels_.width()), top = inside(std::floor(low.y()), pixels_.height());
+    const int width = inside(std::ceil(high.x()), pixels_.width()) - left,
+              height = inside(std::ceil(high.y()), pixels_.height()) - top;
+    if (width == 0 || height == 0) return;
+    cv::Mat fine = cv::Mat::zeros(height * zoom, width * zoom, CV_8UC1), share;
+    shape(fine, orbis::vec2(left, top));
+    cv::resize(fine, share, cv::Size(width, height), 0, 0, cv::INTER_AREA);
+    const auto mix = [](std::uint8_t& to, std::uint8_t from, int weight) {
+      to = static_cast<std::uint8_t>((from * weight + to * (255 - weight) + 127) / 255);
+    };
+    for (int y = 0; y != height; ++y)
+      for (int x = 0; x != width; ++x) {
+        const int weight = share.at<std::uint8_t>(y, x);
+        if (weight == 0) continue;
+        orbis::rgb8& pixel = pixels_(left + x, top + y);
+        mix(pixel.r, color.r, weight);
+        mix(pixel.g, color.g, weight);
+        mix(pixel.b, color.b, weight);
+      }
+  }
+  static cv::Mat as_mat(const orbis::image<orbis::rgb8>& picture) {  // shares the pixels
+    return {picture.height(), picture.width(), CV_8UC3, const_cast<orbis::rgb8*>(picture.data())};
+  }
   static double font_scale(double size) { return size * zoom / 30.0; }
   static int font_thickness(bool bold) { return bold ? 3 : 2; }
-  static double text_width(const std::string& what, double size, bool bold = false) {
+  /// Width of a text, and its height above the base line.
+  static orbis::vec2 text_size(const std::string& what, double size, bool bold = false) {
     int below = 0;
     const cv::Size extent =
         cv::getTextSize(what, cv::FONT_HERSHEY_SIMPLEX, font_scale(size), font_thickness(bold), &below);
-    return static_cast<double>(extent.width) / zoom;
+    return orbis::vec2(extent.width, extent.height) / zoom;
   }
-  static cv::Point at(const orbis::vec2& p) {  // with four fractional bits
-    return {static_cast<int>(std::lround(p.x() * zoom * 16)), static_cast<int>(std::lround(p.y() * zoom * 16))};
+  static cv::Point at(const orbis::vec2& p) {
+    constexpr double scale = zoom << fraction_bits;
+    return {static_cast<int>(std::lround(p.x() * scale)), static_cast<int>(std::lround(p.y() * scale))};
   }
-  cv::Mat pixels_;
+
+  orbis::image<orbis::rgb8> pixels_;
 };
 
 /// A step size of 1, 2 or 5 times a power of ten that divides `range` into about `parts` parts.
@@ -142,9 +199,9 @@ class axes {
   [[nodiscard]] orbis::vec2 place(double x, double y) const {
     return {left_ + (x - x_.low) / x_.length() * width_, top_ + (y_.high - y) / y_.length() * height_};
   }
-  void curve(const std::vector<orbis::vec2>& points, const cv::Scalar& color, double width) {
-    for (std::size_t i = 1; i < points.size(); ++i)
-      sheet_.line(place(points[i - 1].x(), points[i - 1].y()), place(points[i].x(), points[i].y()), color, width);
+  void curve(std::vector<orbis::vec2> points, orbis::rgb8 color, double width) {
+    for (orbis::vec2& p : points) p = place(p.x(), p.y());
+    sheet_.curve(points, color, width);
   }
 
  private:
