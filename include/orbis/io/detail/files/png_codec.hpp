@@ -154,7 +154,10 @@ struct png_encoder {
     if (info == nullptr) return false;
     png_set_write_fn(png, to, png_give, [](png_structp) {});
     png_set_user_limits(png, 0x7fffffff, 0x7fffffff);
-    png_set_compression_level(png, 6);
+    // 640 x 480, a simulated room: in colour, level 4 takes 65 ms and level 6 160 ms, and the files have the same size;
+    // depth takes 13 ms and 153 kB without a row filter, 39 ms and 222 kB with libpng's choice of filters.
+    png_set_compression_level(png, 4);
+    if (bits == 16) png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_NONE);
     png_set_IHDR(png, info, width, height, bits, color_type, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
                  PNG_FILTER_TYPE_DEFAULT);
     png_write_info(png, info);
