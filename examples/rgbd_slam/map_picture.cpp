@@ -67,7 +67,14 @@ eye look_at(const std::vector<vec3>& points, double azimuth, double elevation, d
 
 class picture {
  public:
-  picture(int width, int height) : color_(width, height, paper), inverse_depth_(width, height, 0.0F) {}
+  /// Uses the memory of the two vectors.
+  picture(std::vector<rgb8>& colors, std::vector<float>& inverse_depths, int width, int height) {
+    const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+    colors.assign(pixels, paper);
+    inverse_depths.assign(pixels, 0.0F);
+    color_ = {colors.data(), width, height};
+    inverse_depth_ = {inverse_depths.data(), width, height};
+  }
 
   /// Draws a convex quadrilateral; each corner is a pixel and a depth.
   void quad(const std::array<vec3, 4>& c, rgb8 color) {
@@ -145,7 +152,7 @@ class picture {
     constexpr int reach = 2 * oversampling;
     double behind = 0.0;
     for (const auto& [dx, dy] : {std::pair{reach, 0}, {-reach, 0}, {0, reach}, {0, -reach}}) {
-      if (!inverse_depth_.view().contains(x + dx, y + dy)) continue;
+      if (!inverse_depth_.contains(x + dx, y + dy)) continue;
       const float there = inverse_depth_(x + dx, y + dy);
       if (!(there > here)) continue;
       const float ratio = there / here;
@@ -155,8 +162,8 @@ class picture {
     return behind == 0.0 ? 1.0 : std::exp(-6.0 * behind / 4.0);
   }
 
-  orbis::image<rgb8> color_;
-  orbis::image<float> inverse_depth_;
+  orbis::image_view<rgb8> color_;
+  orbis::image_view<float> inverse_depth_;
 };
 
 rgb8 lit(rgb8 c, double light) {
@@ -203,8 +210,7 @@ class drawn_voxels {
 };
 
 orbis::image<rgb8> draw(const std::vector<voxel>& voxels, const view_frame& frame, coloring how, const eye& e,
-                        int width, int height) {
-  picture canvas{width * oversampling, height * oversampling};
+                        picture canvas) {
   // Cubes are aligned with the world axes, which are the columns of the rotation in the view.
   const orbis::mat3 axes = frame.T_view_world.rotation_matrix();
   const drawn_voxels drawn{voxels, frame};
@@ -233,20 +239,24 @@ orbis::image<rgb8> draw(const std::vector<voxel>& voxels, const view_frame& fram
 
 }  // namespace
 
-orbis::image<rgb8> draw_aslant(const std::vector<voxel>& voxels, const std::vector<voxel>& in_view,
-                               const view_frame& frame, coloring how, int width, int height) {
+map_painter::map_painter(const std::vector<voxel>& in_view, const view_frame& frame)
+    : frame_{frame}, in_view_{framed(in_view, frame)} {}
+
+orbis::image<rgb8> map_painter::draw_aslant(const std::vector<voxel>& voxels, coloring how, int width, int height) {
   constexpr double degree = std::numbers::pi / 180.0;
-  const eye e = look_at(framed(in_view, frame), -62 * degree, 50 * degree, 34 * degree, width * oversampling,
-                        height * oversampling);
-  return draw(voxels, frame, how, e, width, height);
+  width *= oversampling;
+  height *= oversampling;
+  const eye e = look_at(in_view_, -62 * degree, 50 * degree, 34 * degree, width, height);
+  return draw(voxels, frame_, how, e, picture{colors_, inverse_depths_, width, height});
 }
 
-view_from_above draw_from_above(const std::vector<voxel>& voxels, const std::vector<voxel>& in_view,
-                                const view_frame& frame, coloring how, int width, int height) {
+view_from_above map_painter::draw_from_above(const std::vector<voxel>& voxels, coloring how, int width, int height) {
   constexpr double degree = std::numbers::pi / 180.0;
-  const eye e = look_at(framed(in_view, frame), -90 * degree, 89.9 * degree, 6 * degree, width * oversampling,
-                        height * oversampling);
-  return {draw(voxels, frame, how, e, width, height), e.focal / e.position.z() / oversampling};
+  width *= oversampling;
+  height *= oversampling;
+  const eye e = look_at(in_view_, -90 * degree, 89.9 * degree, 6 * degree, width, height);
+  return {draw(voxels, frame_, how, e, picture{colors_, inverse_depths_, width, height}),
+          e.focal / e.position.z() / oversampling};
 }
 
 }  // namespace app

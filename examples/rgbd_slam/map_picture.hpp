@@ -14,18 +14,30 @@ namespace app {
 
 enum class coloring { camera, height };
 
-/// Draws an oblique perspective view. Voxels above `frame.cut` are omitted. The view is fitted to `in_view`, so that
-/// pictures with the same `in_view` have the same view.
-[[nodiscard]] orbis::image<orbis::rgb8> draw_aslant(const std::vector<voxel>& voxels, const std::vector<voxel>& in_view,
-                                                    const view_frame& frame, coloring how, int width, int height);
-
 /// A view from above, and its scale in pixels per metre.
 struct view_from_above {
   orbis::image<orbis::rgb8> picture;
   double pixels_per_metre;
 };
-/// Draws a view from above; the frame's y axis points up in the picture. Otherwise like `draw_aslant`.
-[[nodiscard]] view_from_above draw_from_above(const std::vector<voxel>& voxels, const std::vector<voxel>& in_view,
-                                              const view_frame& frame, coloring how, int width, int height);
+
+/// Draws views of maps. Voxels above `frame.cut` are omitted. Each view is fitted to `in_view`, so that pictures of
+/// several maps of the same size show the same view.
+class map_painter {
+ public:
+  map_painter(const std::vector<voxel>& in_view, const view_frame& frame);
+
+  /// Draws an oblique perspective view.
+  [[nodiscard]] orbis::image<orbis::rgb8> draw_aslant(const std::vector<voxel>& voxels, coloring how, int width,
+                                                      int height);
+  /// Draws a view from above; the frame's y axis points up in the picture.
+  [[nodiscard]] view_from_above draw_from_above(const std::vector<voxel>& voxels, coloring how, int width, int height);
+
+ private:
+  view_frame frame_;
+  std::vector<orbis::vec3> in_view_;
+  // The surface on which views are drawn; a member so that its memory is reused.
+  std::vector<orbis::rgb8> colors_;
+  std::vector<float> inverse_depths_;
+};
 
 }  // namespace app

@@ -96,11 +96,10 @@ orbis::result<void> write_trajectory_picture(const results& r, const view_frame&
 }
 
 orbis::result<void> write_map_picture(const std::string& name, const std::string& title, const tree_numbers& numbers,
-                                      const std::vector<voxel>& voxels, const orbis::image<orbis::rgb8>& aslant,
+                                      const orbis::image<orbis::rgb8>& aslant, const view_from_above& above,
                                       const results& r, const view_frame& frame) {
   sheet s{1500, 820};
   s.paste(aslant, 20, 100);
-  const view_from_above above = draw_from_above(voxels, r.map->voxels, frame, coloring::height, 560, 620);
   s.paste(above.picture, 920, 130);
   s.text(title, {60, 44}, ink, 19, 0.0, true);
   char buffer[160];
@@ -161,16 +160,17 @@ orbis::result<void> write_pictures(const results& r, const view_frame& frame) {
   if (auto done = write_trajectory_picture(r, frame); !done) return done;
   if (!r.map) return {};
   const map_results& m = *r.map;
-  const auto draw = [&](const std::vector<voxel>& voxels) {
-    return draw_aslant(voxels, m.voxels, frame, m.cloud.has_colors() ? coloring::camera : coloring::height, 880, 700);
-  };
-  const orbis::image<orbis::rgb8> before = draw(m.voxels_unfiltered), after = draw(m.voxels);
-  if (auto done = write_map_picture("map_unfiltered.png", r.title + ": the map before the filter", m.unfiltered,
-                                    m.voxels_unfiltered, before, r, frame);
+  map_painter painter{m.voxels, frame};
+  const coloring how = m.cloud.has_colors() ? coloring::camera : coloring::height;
+  const auto before = painter.draw_aslant(m.voxels_unfiltered, how, 880, 700),
+             after = painter.draw_aslant(m.voxels, how, 880, 700);
+  if (auto done = write_map_picture("map_unfiltered.png", r.title + ": the map before the filter", m.unfiltered, before,
+                                    painter.draw_from_above(m.voxels_unfiltered, coloring::height, 560, 620), r, frame);
       !done)
     return done;
   if (auto done = write_filter_picture(r, frame, before, after); !done) return done;
-  return write_map_picture("map.png", r.title + ": the map", m.filtered, m.voxels, after, r, frame);
+  return write_map_picture("map.png", r.title + ": the map", m.filtered, after,
+                           painter.draw_from_above(m.voxels, coloring::height, 560, 620), r, frame);
 }
 
 }  // namespace app
