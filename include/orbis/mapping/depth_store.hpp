@@ -9,17 +9,12 @@
 /// @endcode
 #pragma once
 
-#include <algorithm>
-#include <atomic>
-#include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <span>
-#include <string>
 #include <unordered_map>
-#include <utility>
 #include <vector>
 
 #include <orbis/core/image.hpp>
@@ -49,86 +44,37 @@ struct depth_store_options {
 /// Any number of threads may call const members, including `get`, while no thread calls a non-const member. Movable.
 class depth_store {
  public:
-  explicit depth_store(depth_store_options options = {})
-      : memory_budget_{options.memory_budget}, file_{options.spill_file} {
-    if (!options.spill_file.empty()) spills_ = true;
-  }
+  explicit depth_store(const depth_store_options& options = {});
+  depth_store(depth_store&&) noexcept;
+  depth_store& operator=(depth_store&&) noexcept;
+  ~depth_store();
 
   /// Stores `depth` for `frame`, and replaces an existing image of this frame. Error: write_failed if an image could
   /// not be written to the spill file: the disk is full, the folder does not exist, or the file exists already. In that
   /// case nothing is lost: this image and the others stay in memory, beyond the budget, and the next call tries again.
   /// Linear in the number of pixels, about 2 ms for 640 x 480.
-  result<void> put(std::uint64_t frame, image_view<const std::uint16_t> depth) {
-    const std::span<const std::byte> packed = encoder_.encode(depth);
-    erase(frame);
-    entry& e = entries_[frame];
-    e.width = depth.width();
-    e.height = depth.height();
-    e.in_memory.assign(packed.begin(), packed.end());
-    e.last_use = ++uses_;
-    bytes_in_memory_ += e.in_memory.size();
-    return keep_budget();
-  }
+  result<void> put(std::uint64_t frame, image_view<const std::uint16_t> depth);
 
   /// Removes the pixels that are 0 in `depth` from the image of `frame`, in place of those removed by an earlier call.
   /// Only the runs of pixels without depth are stored; they stay in memory and do not count towards the budget. Errors:
   /// not_found; invalid_argument if the size of `depth` differs from that of the image. Linear in the number of pixels,
   /// about 0.2 ms for 640 x 480.
   /// @pre the other pixels of `depth` are those of the image
-  result<void> mask(std::uint64_t frame, image_view<const std::uint16_t> depth) {
-    const auto at = entries_.find(frame);
-    if (at == entries_.end()) return not_stored(frame);
-    const entry& e = at->second;
-    if (depth.width() != e.width || depth.height() != e.height)
-      return fail(errc::invalid_argument, name(frame),
-                  "the mask has " + size_text(depth.width(), depth.height()) + " pixels, but the depth image has " +
-                      size_text(e.width, e.height));
-    assert(is_part_of_image(e, depth));
-    bytes_of_masks_ -= at->second.zeros.size();
-    at->second.zeros = detail::encode_zeros(depth);
-    bytes_of_masks_ += at->second.zeros.size();
-    return {};
-  }
+  result<void> mask(std::uint64_t frame, image_view<const std::uint16_t> depth);
 
   /// Copies the image of `frame`, with 0 in removed pixels, to `out`, which is resized to the size of the image. A
   /// spilled image stays in the file. Errors: not_found; unreadable or malformed if the spill file fails or is damaged
   /// (`out` is then empty). Linear in the number of pixels, about 1 ms for 640 x 480.
-  result<void> get(std::uint64_t frame, image<std::uint16_t>& out) const {
-    auto done = get_whole(frame, out);
-    if (done) detail::set_zeros(entries_.find(frame)->second.zeros, out.view());
-    return done;
-  }
+  result<void> get(std::uint64_t frame, image<std::uint16_t>& out) const;
   /// Like `get`, but includes the removed pixels.
-  result<void> get_whole(std::uint64_t frame, image<std::uint16_t>& out) const {
-    const auto at = entries_.find(frame);
-    if (at == entries_.end()) return not_stored(frame);
-    const entry& e = at->second;
-    std::atomic_ref{e.last_use}.store(std::atomic_ref{uses_}.fetch_add(1) + 1);
-    auto done = decode(e, out);
-    if (done) return done;
-    out = {};
-    error why = done.error();
-    why.where = name(frame) + ", " + why.where;
-    return fail(std::move(why));
-  }
+  result<void> get_whole(std::uint64_t frame, image<std::uint16_t>& out) const;
 
   /// Removes the image of `frame`. Returns false if there is none.
-  bool erase(std::uint64_t frame) {
-    const auto at = entries_.find(frame);
-    if (at == entries_.end()) return false;
-    bytes_in_memory_ -= at->second.in_memory.size();
-    bytes_of_masks_ -= at->second.zeros.size();
-    if (const auto& record = at->second.spilled) {
-      bytes_spilled_ -= record->size;
-      file_.erase(*record);
-    }
-    entries_.erase(at);
-    return true;
-  }
+  bool erase(std::uint64_t frame);
 
-  [[nodiscard]] bool contains(std::uint64_t frame) const { return entries_.contains(frame); }
+  [[nodiscard]] bool contains(std::uint64_t frame) const;
   /// Frees the buffers of `put`; the next call to `put` allocates them again.
-  void free_buffers() { encoder_ = {}; }
+  void free_buffers();
   /// Number of images.
   [[nodiscard]] std::size_t size() const noexcept { return entries_.size(); }
   /// Size of the compressed images in memory, and of the masks: the runs of pixels without depth.
@@ -148,59 +94,19 @@ class depth_store {
     std::uint64_t when, frame;
   };
 
-  [[nodiscard]] static std::string name(std::uint64_t frame) { return "frame " + std::to_string(frame); }
-  [[nodiscard]] static tl::unexpected<error> not_stored(std::uint64_t frame) {
-    return fail(errc::not_found, name(frame), "no depth image is stored for this frame");
-  }
-  [[nodiscard]] static std::string size_text(int width, int height) {
-    return std::to_string(width) + " x " + std::to_string(height);
-  }
-  [[nodiscard]] result<void> decode(const entry& e, image<std::uint16_t>& out) const {
-    if (out.width() != e.width || out.height() != e.height) out = image<std::uint16_t>(e.width, e.height);
-    detail::depth_decoder decoder;
-    if (!e.spilled) return decoder.decode(e.in_memory, out.view());
-    const auto bytes = file_.read(*e.spilled);
-    return bytes ? decoder.decode(*bytes, out.view()) : result<void>{fail(bytes.error())};
-  }
-  /// Returns true if every pixel is 0 or equals that of the image, or if the image cannot be read. Does not count as a
-  /// use of the image, so that the same images are spilled with and without assertions.
-  [[nodiscard]] bool is_part_of_image(const entry& e, image_view<const std::uint16_t> depth) const {
-    image<std::uint16_t> whole;
-    if (!decode(e, whole)) return true;
-    for (int y = 0; y != depth.height(); ++y)
-      for (int x = 0; x != depth.width(); ++x)
-        if (depth(x, y) != 0 && depth(x, y) != whole(x, y)) return false;
-    return true;
-  }
+  [[nodiscard]] result<void> decode(const entry& e, image<std::uint16_t>& out) const;
+  /// Returns true if every pixel is 0 or equals that of the image, or if the image cannot be read. Does not count as
+  /// a use of the image, so that the same images are spilled with and without assertions.
+  [[nodiscard]] bool is_part_of_image(const entry& e, image_view<const std::uint16_t> depth) const;
 
-  result<void> keep_budget() {
-    while (spills_ && bytes_in_memory_ > memory_budget_) {
-      if (oldest_.empty()) list_uses();
-      const use next = oldest_.back();
-      const auto at = entries_.find(next.frame);
-      if (at != entries_.end() && !at->second.spilled && at->second.last_use == next.when) {
-        entry& e = at->second;
-        auto record = file_.write(e.in_memory);
-        if (!record) return fail(std::move(record.error()));
-        bytes_in_memory_ -= e.in_memory.size();
-        bytes_spilled_ += e.in_memory.size();
-        e.spilled = *record;
-        std::vector<std::byte>{}.swap(e.in_memory);
-      }
-      oldest_.pop_back();
-    }
-    return {};
-  }
-  /// Lists the images in memory, the most recently used first. Images used later are more recent than all listed ones.
-  void list_uses() {
-    for (const auto& [frame, e] : entries_)
-      if (!e.spilled) oldest_.push_back({e.last_use, frame});
-    std::sort(oldest_.begin(), oldest_.end(), [](const use& a, const use& b) { return a.when > b.when; });
-  }
+  result<void> keep_budget();
+  /// Lists the images in memory, the most recently used first. Images used later are more recent than all listed
+  /// ones.
+  void list_uses();
 
   std::size_t memory_budget_;
   detail::spill_file file_;
-  bool spills_ = false;
+  bool spills_;
   detail::depth_encoder encoder_;
   std::unordered_map<std::uint64_t, entry> entries_;
   std::vector<use> oldest_;  // an earlier list of uses, the oldest last; exhausted before a new list is made
@@ -209,3 +115,7 @@ class depth_store {
 };
 
 }  // namespace orbis::mapping
+
+#ifndef ORBIS_COMPILED
+#include <orbis/mapping/depth_store-inl.hpp>
+#endif

@@ -3,6 +3,8 @@
 /// Implementation of occupancy_octree.hpp.
 #pragma once
 
+#include <utility>
+
 #include <orbis/octree/detail/mark/mark_scan.hpp>
 #include <orbis/octree/detail/storage/apply_scan.hpp>
 #include <orbis/octree/detail/storage/palette_kernels.hpp>
@@ -25,6 +27,22 @@ template <sensor_model Model>
 }
 
 }  // namespace detail
+
+template <sensor_model Model>
+occupancy_octree<Model>::occupancy_octree(double resolution, int tree_depth) : grid_{resolution, tree_depth} {}
+template <sensor_model Model>
+occupancy_octree<Model>::occupancy_octree(double resolution, int tree_depth, detail::brick_store<value_type> store)
+    : grid_{resolution, tree_depth}, store_{std::move(store)} {}
+template <sensor_model Model>
+occupancy_octree<Model>::occupancy_octree(const occupancy_octree&) = default;
+template <sensor_model Model>
+occupancy_octree<Model>::occupancy_octree(occupancy_octree&&) noexcept = default;
+template <sensor_model Model>
+occupancy_octree<Model>& occupancy_octree<Model>::operator=(const occupancy_octree&) = default;
+template <sensor_model Model>
+occupancy_octree<Model>& occupancy_octree<Model>::operator=(occupancy_octree&&) noexcept = default;
+template <sensor_model Model>
+occupancy_octree<Model>::~occupancy_octree() = default;
 
 template <sensor_model Model>
 integration_summary occupancy_octree<Model>::integrate_points(const parallel_policy& policy,

@@ -80,10 +80,14 @@ class occupancy_octree {
 
   /// Creates an empty map. `resolution`: edge of a voxel, metres. `tree_depth`: the map is 2^tree_depth voxels wide.
   /// @pre resolution finite and > 0; 5 <= tree_depth <= max_tree_depth
-  explicit occupancy_octree(double resolution, int tree_depth = default_tree_depth) : grid_{resolution, tree_depth} {}
+  explicit occupancy_octree(double resolution, int tree_depth = default_tree_depth);
   /// Creates a map from bricks, for the library's own readers. @pre no brick is outside the grid
-  occupancy_octree(double resolution, int tree_depth, detail::brick_store<value_type> store)
-      : grid_{resolution, tree_depth}, store_{std::move(store)} {}
+  occupancy_octree(double resolution, int tree_depth, detail::brick_store<value_type> store);
+  occupancy_octree(const occupancy_octree&);
+  occupancy_octree(occupancy_octree&&) noexcept;
+  occupancy_octree& operator=(const occupancy_octree&);
+  occupancy_octree& operator=(occupancy_octree&&) noexcept;
+  ~occupancy_octree();
 
   [[nodiscard]] double resolution() const noexcept { return grid_.resolution(); }
   [[nodiscard]] int tree_depth() const noexcept { return grid_.depth(); }
