@@ -20,7 +20,7 @@ function(build_by_pkg_config name package program)
 endfunction()
 
 file(REMOVE_RECURSE ${SCRATCH})
-set(options -G ${GENERATOR} -DCMAKE_CXX_COMPILER=${COMPILER} -DCMAKE_BUILD_TYPE=Debug)
+set(options -G ${GENERATOR} -DCMAKE_CXX_COMPILER=${COMPILER} -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG=-O0)
 
 if(WAY STREQUAL "find_package")
   run(${CMAKE_COMMAND} -S ${ORBIS_SOURCE} -B ${SCRATCH}/orbis ${options} -DORBIS_BUILD_TESTS=OFF
