@@ -34,11 +34,14 @@ se3 upright_worlds::start_world(const orbis::camera::rgbd_frame& frame, bool is_
   // If the z axis of the ground truth points up within the accuracy of the estimate, it is assumed to be exact.
   const double reach = (view.source == upright_source::assumed ? 45.0 : 10.0) * std::numbers::pi / 180.0;
   const vec3 up = frame.T_world_camera->rotation() * view.up_camera();
-  if (std::atan2(up.cross(vec3::UnitZ()).norm(), up.z()) <= reach) {
+  const vec3 axis = up.cross(vec3::UnitZ());
+  const double sine = axis.norm(), tilt = std::atan2(sine, up.z());
+  if (tilt <= reach) {
     how.up_from = "ground truth";
     return *frame.T_world_camera;
   }
-  const so3 upright{Eigen::Quaterniond::FromTwoVectors(up, vec3::UnitZ())};
+  const vec3 any_horizontal = vec3::UnitX();  // if `up` points down
+  const so3 upright = so3::exp(tilt * (sine > 0.0 ? vec3(axis / sine) : any_horizontal));
   return se3{upright, vec3::Zero()} * *frame.T_world_camera;
 }
 
