@@ -10,9 +10,6 @@
 
 namespace orbis::optimize {
 
-template struct detail::schur_kernels<6, true>;
-template struct detail::schur_kernels<9, true>;
-
 using pinhole_adjuster = bundle_adjuster<reprojection<camera::pinhole>>;
 using any_adjuster = bundle_adjuster<reprojection<camera::any_camera>>;
 using observations = std::span<const bundle_observation>;

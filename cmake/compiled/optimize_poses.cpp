@@ -16,10 +16,6 @@
 
 namespace orbis::optimize {
 
-template class detail::block_cholesky<6>;
-template class detail::block_cholesky<7>;
-template class detail::block_cholesky<9>;
-
 using points = std::span<const vec3>;
 using pixels = std::span<const vec2>;
 template result<pose_estimate> estimate_pose(points, pixels, const camera::pinhole&, const pnp_options&,

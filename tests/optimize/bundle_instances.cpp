@@ -10,6 +10,8 @@ template struct detail::bundle_kernels<reprojection<camera::pinhole>, trivial>;
 template struct detail::bundle_kernels<reprojection<camera::pinhole>, huber>;
 template struct detail::bundle_kernels<reprojection<camera::any_camera>, huber>;
 #else
+ORBIS_TEST_KERNELS(template, 6)
+ORBIS_TEST_KERNELS(template, 9)
 ORBIS_TEST_BUNDLE(template, reprojection<camera::pinhole>, huber)
 ORBIS_TEST_BUNDLE(template, reprojection<camera::any_camera>, huber)
 #endif

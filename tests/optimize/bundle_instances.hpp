@@ -26,20 +26,23 @@
   ORBIS_TEST_SOLVE(what, residual, loss, sequential_policy) \
   ORBIS_TEST_SOLVE(what, residual, loss, parallel_policy)
 /// For cameras with `size` numbers.
-#define ORBIS_TEST_BLOCKS(what, size)            \
-  what struct detail::panel_kernels<size>;       \
-  what struct detail::schur_kernels<size, true>; \
-  what class detail::block_cholesky<size>;       \
+#define ORBIS_TEST_BLOCKS(what, size)      \
+  what struct detail::panel_kernels<size>; \
   what class detail::reduced_solver<size>;
+#define ORBIS_TEST_KERNELS(what, size)           \
+  what struct detail::schur_kernels<size, true>; \
+  what class detail::block_cholesky<size>;
 
 namespace orbis::optimize {
 
 ORBIS_TEST_BLOCKS(extern template, 6)
+ORBIS_TEST_KERNELS(extern template, 6)
 ORBIS_TEST_BUNDLE(extern template, reprojection<camera::pinhole>, huber)
 ORBIS_TEST_BUNDLE(extern template, reprojection<camera::any_camera>, huber)
 extern template struct detail::bundle_kernels<reprojection<camera::pinhole>, trivial>;
 
 ORBIS_TEST_BLOCKS(extern template, 9)
+ORBIS_TEST_KERNELS(extern template, 9)
 ORBIS_TEST_BUNDLE(extern template, bal_reprojection, huber)
 ORBIS_TEST_BUNDLE(extern template, bal_reprojection, trivial)
 

@@ -357,7 +357,7 @@ schur_kernels<C, ThroughCamera>::schur_kernels()
     : eliminate_points{simd::kernel<eliminate_kernel<C, ThroughCamera>, eliminator>()},
       substitute_points{simd::kernel<substitute_kernel<C, ThroughCamera>, substituter>()} {}
 
-#ifdef ORBIS_COMPILED  // in the library
+#ifdef ORBIS_COMPILED  // instantiated in cmake/compiled/optimize_kernels.cpp
 extern template struct schur_kernels<6, true>;
 extern template struct schur_kernels<9, true>;
 #endif

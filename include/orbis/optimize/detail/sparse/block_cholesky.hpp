@@ -283,7 +283,7 @@ requires(B >= 1) void block_cholesky<B>::solve(std::span<double> x) {
     std::copy_n(ordered_.begin() + offset(k), B, x.begin() + offset(symbolic_.order[k]));
 }
 
-#ifdef ORBIS_COMPILED  // in the library
+#ifdef ORBIS_COMPILED  // instantiated in cmake/compiled/optimize_kernels.cpp
 extern template class block_cholesky<6>;
 extern template class block_cholesky<7>;
 extern template class block_cholesky<9>;
