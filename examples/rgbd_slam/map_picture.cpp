@@ -9,6 +9,8 @@
 #include <limits>
 #include <numbers>
 
+#include "picture_colors.hpp"
+
 namespace app {
 namespace {
 
@@ -16,58 +18,11 @@ using orbis::rgb8;
 using orbis::vec3;
 
 constexpr int oversampling = 2;
-
-/// A pinhole camera that looks along `forward`; x right, y down.
-struct eye {
-  vec3 position, right, down, forward;
-  double focal, cx, cy;
-
-  [[nodiscard]] vec3 see(const vec3& p) const {  // returns the pixel and the depth
-    const vec3 d = p - position;
-    const double z = forward.dot(d);
-    return {cx + focal * right.dot(d) / z, cy + focal * down.dot(d) / z, z};
-  }
-};
-
-/// A camera at an azimuth and elevation (radians) from the points, at the smallest distance that shows them all.
-eye look_at(const std::vector<vec3>& points, double azimuth, double elevation, double field, int width, int height) {
-  eye e;
-  e.forward =
-      -vec3(std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
-  e.right = vec3(-std::sin(azimuth), std::cos(azimuth), 0.0);
-  e.down = e.forward.cross(e.right);
-  e.focal = 0.5 * height / std::tan(0.5 * field);
-  e.cx = 0.5 * width;
-  e.cy = 0.5 * height;
-  // The centre of the points' bounds in the image: exact without perspective, otherwise close enough after a few
-  // rounds.
-  vec3 middle = vec3::Zero();
-  for (const vec3& p : points) middle += p / static_cast<double>(points.size());
-  for (int round = 0; round != 4; ++round) {
-    double distance = 0.1;
-    for (const vec3& p : points) {
-      const vec3 d = p - middle;
-      const double across =
-          std::max(std::abs(e.right.dot(d)) / (0.47 * width), std::abs(e.down.dot(d)) / (0.47 * height));
-      distance = std::max(distance, across * e.focal - e.forward.dot(d));
-    }
-    e.position = middle - distance * e.forward;
-    double left = width, right = 0.0, top = height, bottom = 0.0;
-    for (const vec3& p : points) {
-      const vec3 pixel = e.see(p);
-      left = std::min(left, pixel.x());
-      right = std::max(right, pixel.x());
-      top = std::min(top, pixel.y());
-      bottom = std::max(bottom, pixel.y());
-    }
-    middle += distance / e.focal * (0.5 * (left + right - width) * e.right + 0.5 * (top + bottom - height) * e.down);
-  }
-  return e;
-}
+constexpr double degree = std::numbers::pi / 180.0;
 
 class picture {
  public:
-  /// Uses the memory of the two vectors.
+  /// Draws into the two vectors, which are overwritten.
   picture(std::vector<rgb8>& colors, std::vector<float>& inverse_depths, int width, int height) {
     const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
     colors.assign(pixels, paper);
@@ -177,6 +132,7 @@ bool is_shown(const vec3& p, const view_frame& frame) { return p.z() <= frame.cu
 /// The points that a view must contain: the drawn voxels, excluding outliers.
 std::vector<vec3> framed(const std::vector<voxel>& voxels, const view_frame& frame) {
   std::vector<vec3> points;
+  points.reserve(voxels.size());
   for (const voxel& v : voxels) {
     const vec3 p = frame.T_view_world * v.center.cast<double>();
     const bool inside = (p.array() >= frame.low.array()).all() && (p.array() <= frame.high.array()).all();
@@ -209,16 +165,76 @@ class drawn_voxels {
   std::vector<key_type> keys_;
 };
 
-orbis::image<rgb8> draw(const std::vector<voxel>& voxels, const view_frame& frame, coloring how, const eye& e,
-                        picture canvas) {
+}  // namespace
+
+vec3 map_painter::eye::see(const vec3& p) const {
+  const vec3 d = p - position;
+  const double z = forward.dot(d);
+  return {0.5 * width + focal * right.dot(d) / z, 0.5 * height + focal * down.dot(d) / z, z};
+}
+
+map_painter::eye map_painter::look_at(const std::vector<vec3>& points, double azimuth, double elevation, double field,
+                                      int width, int height) {
+  eye e;
+  e.forward =
+      -vec3(std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
+  e.right = vec3(-std::sin(azimuth), std::cos(azimuth), 0.0);
+  e.down = e.forward.cross(e.right);
+  e.focal = 0.5 * height / std::tan(0.5 * field);
+  e.width = width;
+  e.height = height;
+  // The centre of the points' bounds in the image: exact without perspective, otherwise close enough after a few
+  // rounds.
+  vec3 middle = vec3::Zero();
+  for (const vec3& p : points) middle += p / static_cast<double>(points.size());
+  for (int round = 0; round != 4; ++round) {
+    double distance = 0.1;
+    for (const vec3& p : points) {
+      const vec3 d = p - middle;
+      const double across =
+          std::max(std::abs(e.right.dot(d)) / (0.47 * width), std::abs(e.down.dot(d)) / (0.47 * height));
+      distance = std::max(distance, across * e.focal - e.forward.dot(d));
+    }
+    e.position = middle - distance * e.forward;
+    double left = width, right = 0.0, top = height, bottom = 0.0;
+    for (const vec3& p : points) {
+      const vec3 pixel = e.see(p);
+      left = std::min(left, pixel.x());
+      right = std::max(right, pixel.x());
+      top = std::min(top, pixel.y());
+      bottom = std::max(bottom, pixel.y());
+    }
+    middle += distance / e.focal * (0.5 * (left + right - width) * e.right + 0.5 * (top + bottom - height) * e.down);
+  }
+  return e;
+}
+
+map_painter::map_painter(const std::vector<voxel>& in_view, const view_frame& frame) : frame_{frame} {
+  const std::vector<vec3> points = framed(in_view, frame);
+  aslant_ = look_at(points, -62 * degree, 50 * degree, 34 * degree, 880 * oversampling, 700 * oversampling);
+  from_above_ = look_at(points, -90 * degree, 89.9 * degree, 6 * degree, 560 * oversampling, 620 * oversampling);
+}
+
+orbis::image<rgb8> map_painter::draw_aslant(const std::vector<voxel>& voxels, coloring how) {
+  return draw(voxels, how, aslant_);
+}
+
+orbis::image<rgb8> map_painter::draw_from_above(const std::vector<voxel>& voxels, coloring how) {
+  return draw(voxels, how, from_above_);
+}
+
+double map_painter::pixels_per_metre() const { return from_above_.focal / from_above_.position.z() / oversampling; }
+
+orbis::image<rgb8> map_painter::draw(const std::vector<voxel>& voxels, coloring how, const eye& e) {
+  picture canvas{colors_, inverse_depths_, e.width, e.height};
   // Cubes are aligned with the world axes, which are the columns of the rotation in the view.
-  const orbis::mat3 axes = frame.T_view_world.rotation_matrix();
-  const drawn_voxels drawn{voxels, frame};
+  const orbis::mat3 axes = frame_.T_view_world.rotation_matrix();
+  const drawn_voxels drawn{voxels, frame_};
   for (const voxel& v : voxels) {
-    const vec3 center = frame.T_view_world * v.center.cast<double>();
-    if (!is_shown(center, frame)) continue;
+    const vec3 center = frame_.T_view_world * v.center.cast<double>();
+    if (!is_shown(center, frame_)) continue;
     const rgb8 color =
-        how == coloring::camera ? v.color : height_color((center.z() - frame.low.z()) / (frame.cut - frame.low.z()));
+        how == coloring::camera ? v.color : height_color((center.z() - frame_.low.z()) / (frame_.cut - frame_.low.z()));
     for (int axis = 0; axis != 3; ++axis) {
       const vec3 half = 0.5 * static_cast<double>(v.size) * axes.col(axis);
       const double side = half.dot(e.position - center) > 0 ? 1.0 : -1.0;  // only one of two opposite faces is visible
@@ -235,28 +251,6 @@ orbis::image<rgb8> draw(const std::vector<voxel>& voxels, const view_frame& fram
     }
   }
   return canvas.finish();
-}
-
-}  // namespace
-
-map_painter::map_painter(const std::vector<voxel>& in_view, const view_frame& frame)
-    : frame_{frame}, in_view_{framed(in_view, frame)} {}
-
-orbis::image<rgb8> map_painter::draw_aslant(const std::vector<voxel>& voxels, coloring how, int width, int height) {
-  constexpr double degree = std::numbers::pi / 180.0;
-  width *= oversampling;
-  height *= oversampling;
-  const eye e = look_at(in_view_, -62 * degree, 50 * degree, 34 * degree, width, height);
-  return draw(voxels, frame_, how, e, picture{colors_, inverse_depths_, width, height});
-}
-
-view_from_above map_painter::draw_from_above(const std::vector<voxel>& voxels, coloring how, int width, int height) {
-  constexpr double degree = std::numbers::pi / 180.0;
-  width *= oversampling;
-  height *= oversampling;
-  const eye e = look_at(in_view_, -90 * degree, 89.9 * degree, 6 * degree, width, height);
-  return {draw(voxels, frame_, how, e, picture{colors_, inverse_depths_, width, height}),
-          e.focal / e.position.z() / oversampling};
 }
 
 }  // namespace app

@@ -96,11 +96,11 @@ orbis::result<void> write_trajectory_picture(const results& r, const view_frame&
 }
 
 orbis::result<void> write_map_picture(const std::string& name, const std::string& title, const tree_numbers& numbers,
-                                      const orbis::image<orbis::rgb8>& aslant, const view_from_above& above,
-                                      const results& r, const view_frame& frame) {
+                                      const orbis::image<orbis::rgb8>& aslant, const orbis::image<orbis::rgb8>& above,
+                                      double pixels_per_metre, const results& r, const view_frame& frame) {
   sheet s{1500, 820};
   s.paste(aslant, 20, 100);
-  s.paste(above.picture, 920, 130);
+  s.paste(above, 920, 130);
   s.text(title, {60, 44}, ink, 19, 0.0, true);
   char buffer[160];
   std::snprintf(buffer, sizeof buffer, "%s occupied of %s known leaves, finest voxel %g cm, %s as .bt",
@@ -119,7 +119,7 @@ orbis::result<void> write_map_picture(const std::string& name, const std::string
   s.text("height 0", {1172, 794}, faint, 11, 1.0);
   s.text(buffer, {1388, 794}, faint, 11);
   // A scale bar of 1, 2 or 5 times a power of ten, at most about 120 pixels long.
-  const double length = nice_step(80.0 / above.pixels_per_metre, 1), end = 940 + length * above.pixels_per_metre;
+  const double length = nice_step(80.0 / pixels_per_metre, 1), end = 940 + length * pixels_per_metre;
   s.line({940, 789}, {end, 789}, ink, 1.5);
   for (const double x : {940.0, end}) s.line({x, 785}, {x, 793}, ink, 1.5);
   s.text(tick_text(length, length) + " m", {end + 8, 794}, faint, 11);
@@ -162,15 +162,15 @@ orbis::result<void> write_pictures(const results& r, const view_frame& frame) {
   const map_results& m = *r.map;
   map_painter painter{m.voxels, frame};
   const coloring how = m.cloud.has_colors() ? coloring::camera : coloring::height;
-  const auto before = painter.draw_aslant(m.voxels_unfiltered, how, 880, 700),
-             after = painter.draw_aslant(m.voxels, how, 880, 700);
+  const auto before = painter.draw_aslant(m.voxels_unfiltered, how), after = painter.draw_aslant(m.voxels, how);
   if (auto done = write_map_picture("map_unfiltered.png", r.title + ": the map before the filter", m.unfiltered, before,
-                                    painter.draw_from_above(m.voxels_unfiltered, coloring::height, 560, 620), r, frame);
+                                    painter.draw_from_above(m.voxels_unfiltered, coloring::height),
+                                    painter.pixels_per_metre(), r, frame);
       !done)
     return done;
   if (auto done = write_filter_picture(r, frame, before, after); !done) return done;
   return write_map_picture("map.png", r.title + ": the map", m.filtered, after,
-                           painter.draw_from_above(m.voxels, coloring::height, 560, 620), r, frame);
+                           painter.draw_from_above(m.voxels, coloring::height), painter.pixels_per_metre(), r, frame);
 }
 
 }  // namespace app

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -20,15 +21,12 @@
 #include <orbis/core/types.hpp>
 #include <orbis/io/png.hpp>
 
-#include "view_frame.hpp"
+#include "picture_colors.hpp"
 
 namespace app {
 
-inline constexpr orbis::rgb8 ink{28, 32, 40}, faint{150, 155, 163}, grid{228, 230, 234};
-inline constexpr orbis::rgb8 truth_color{150, 155, 163}, estimate_color{37, 99, 235}, error_color{200, 60, 50},
-    start_color{22, 140, 80};
-
-/// A drawing surface; coordinates are pixels. What is drawn may extend beyond the surface.
+/// A drawing surface; coordinates are pixels. Shapes may extend beyond the surface; those whose coordinates are not
+/// finite are not drawn.
 class sheet {
  public:
   sheet(int width, int height) : pixels_(width, height, paper) {}
@@ -41,6 +39,7 @@ class sheet {
     if (points.size() < 2) return;
     orbis::vec2 low = points.front(), high = low;
     for (const orbis::vec2& p : points) {
+      if (!p.allFinite()) return;
       low = low.cwiseMin(p);
       high = high.cwiseMax(p);
     }
@@ -78,13 +77,15 @@ class sheet {
     text(meaning, p + orbis::vec2(to_text, 0.0), ink, size);
     return p + orbis::vec2(to_text + text_size(meaning, size).x() + apart, 0.0);
   }
-  /// @pre the picture lies within the surface
   void paste(const orbis::image<orbis::rgb8>& picture, int x, int y) { paste(picture, x, y, picture.width()); }
-  /// Pastes a picture that is scaled to a width. @pre it then lies within the surface
+  /// Scales a picture to a width, and pastes it. @pre it is not empty, and then lies within the surface
   void paste(const orbis::image<orbis::rgb8>& picture, int x, int y, int width) {
-    const cv::Mat from = as_mat(picture);
-    cv::Mat to = as_mat(pixels_)({x, y, width, picture.height() * width / picture.width()});
-    cv::resize(from, to, to.size(), 0, 0, cv::INTER_AREA);
+    assert(!picture.empty());
+    const cv::Mat from(picture.height(), picture.width(), CV_8UC3,
+                       const_cast<orbis::rgb8*>(picture.data()));  // only read
+    const cv::Rect part(x, y, width, std::max(1, picture.height() * width / picture.width()));
+    cv::Mat to = cv::Mat(pixels_.height(), pixels_.width(), CV_8UC3, pixels_.data())(part);
+    cv::resize(from, to, part.size(), 0, 0, cv::INTER_AREA);
   }
   [[nodiscard]] orbis::result<void> write(const std::filesystem::path& path) const {
     return orbis::io::write_png(path, pixels_.view());
@@ -98,6 +99,7 @@ class sheet {
   /// `zoom`, whose first pixel is `origin`.
   template <class Shape>
   void draw(const orbis::vec2& low, const orbis::vec2& high, orbis::rgb8 color, const Shape& shape) {
+    if (!low.allFinite() || !high.allFinite()) return;
     const auto inside = [](double v, int limit) { return static_cast<int>(std::clamp<double>(v, 0.0, limit)); };
     const int left = inside(std::floor(low.x()), pixels_.width()), top = inside(std::floor(low.y()), pixels_.height());
     const int width = inside(std::ceil(high.x()), pixels_.width()) - left,
@@ -119,9 +121,6 @@ class sheet {
         mix(pixel.b, color.b, weight);
       }
   }
-  static cv::Mat as_mat(const orbis::image<orbis::rgb8>& picture) {  // shares the pixels
-    return {picture.height(), picture.width(), CV_8UC3, const_cast<orbis::rgb8*>(picture.data())};
-  }
   static double font_scale(double size) { return size * zoom / 30.0; }
   static int font_thickness(bool bold) { return bold ? 3 : 2; }
   /// Width of a text, and its height above the base line.
@@ -132,8 +131,11 @@ class sheet {
     return orbis::vec2(extent.width, extent.height) / zoom;
   }
   static cv::Point at(const orbis::vec2& p) {
-    constexpr double scale = zoom << fraction_bits;
-    return {static_cast<int>(std::lround(p.x() * scale)), static_cast<int>(std::lround(p.y() * scale))};
+    const auto fixed = [](double v) {  // far outside of the surface, the direction of a line is approximate
+      constexpr double scale = zoom << fraction_bits, limit = 1 << 28;
+      return static_cast<int>(std::lround(std::clamp(v * scale, -limit, limit)));
+    };
+    return {fixed(p.x()), fixed(p.y())};
   }
 
   orbis::image<orbis::rgb8> pixels_;

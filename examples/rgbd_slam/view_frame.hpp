@@ -34,8 +34,6 @@ struct view_frame {
 /// The transform from the world frame to the frame of pictures, as `tx ty tz qx qy qz qw`.
 [[nodiscard]] std::string view_frame_text(const view_frame& frame);
 
-inline constexpr orbis::rgb8 paper{250, 250, 249};  ///< background of the pictures
-
 /// The colour for a height, with `t` in [0, 1] from the lowest to the highest point.
 [[nodiscard]] orbis::rgb8 height_color(double t);
 
