@@ -18,11 +18,11 @@
 namespace {
 
 /// Returns large blocks to the system as soon as they are freed, and makes threads share heaps. Otherwise, fragments
-/// left by tracking would make up half of the memory during mapping. The heap itself shrinks in steps of several
-/// images, because otherwise every image would cause page faults again.
+/// left by tracking would make up half of the memory during mapping. Images are smaller than large blocks, and the heap
+/// itself shrinks in steps of several images, because otherwise every image would cause page faults again.
 void set_up_memory() {
 #ifdef __GLIBC__
-  mallopt(M_MMAP_THRESHOLD, 1 << 20);
+  mallopt(M_MMAP_THRESHOLD, 4 << 20);
   mallopt(M_TRIM_THRESHOLD, 8 << 20);
   mallopt(M_ARENA_MAX, 2);
 #endif
