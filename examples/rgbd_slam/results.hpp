@@ -131,7 +131,7 @@ struct live_results {
 struct navigation_results {
   double robot_radius = 0.0;        ///< metres
   std::optional<double> floor_m;    ///< height of the floor; empty if no floor was found
-  double free_m2 = 0.0;             ///< area in which the robot can drive
+  double free_m2 = 0.0;             ///< area of the free floor, also next to obstacles
   std::string path_status;          ///< "found", or the reason why there is no path
   bool drives = false;              ///< the path is on the floor; otherwise it is a path of a flying ball
   std::vector<orbis::vec3> path{};  ///< metres

@@ -222,8 +222,7 @@ std::string filter_lines(const map_results& m) {
 
 std::string floor_text(const navigation_results& n) {
   if (!n.floor_m) return "not found";
-  return text("at a height of %.2f m, %.1f square metres for a robot of radius %g m", *n.floor_m, n.free_m2,
-              n.robot_radius);
+  return text("at a height of %.2f m, %.1f square metres free", *n.floor_m, n.free_m2);
 }
 
 std::string robot_text(const navigation_results& n) {
