@@ -61,6 +61,11 @@ namespace detail {
 }
 
 /// Quotes a word or line of a file, or an argument; at most 60 bytes of it.
-[[nodiscard]] inline std::string in_quotes(std::string_view text) { return "\"" + shortened(text, 60) + "\""; }
+[[nodiscard]] inline std::string in_quotes(std::string_view text) {
+  std::string quoted = "\"";  // GCC 12 warns of an overrun in "..." + std::string
+  quoted += shortened(text, 60);
+  quoted += '"';
+  return quoted;
+}
 
 }  // namespace orbis
