@@ -3,6 +3,7 @@
 // Start and end of a program: exit codes, one-line error messages, and handling of exceptions and signals.
 #pragma once
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <csignal>
@@ -11,6 +12,7 @@
 #include <exception>
 #include <optional>
 #include <string>
+#include <vector>
 
 #if __has_include(<fcntl.h>)
 #include <fcntl.h>
@@ -25,16 +27,20 @@
 
 namespace examples {
 
-/// One-line description of a command-line error. If an argument is missing and an option is unknown, reports the
-/// option, which may be the cause.
+/// One-line description of a command-line error. If there is an unknown option, reports it, because it may be the cause
+/// of other errors, such as a missing argument.
 [[nodiscard]] inline std::string describe_usage(const CLI::App& cli, const CLI::ParseError& e) {
   std::string what = e.what();
-  if (dynamic_cast<const CLI::RequiredError*>(&e) != nullptr)
-    for (const std::string& word : cli.remaining(true))
-      if (word.size() > 1 && word.front() == '-') {
-        what = "unknown option " + orbis::in_quotes(word);
-        break;
-      }
+  const bool is_extra = dynamic_cast<const CLI::ExtrasError*>(&e) != nullptr;
+  if (is_extra || dynamic_cast<const CLI::RequiredError*>(&e) != nullptr) {
+    const std::vector<std::string> rest = cli.remaining(true);
+    const auto option =
+        std::ranges::find_if(rest, [](const std::string& word) { return word.size() > 1 && word.front() == '-'; });
+    if (option != rest.end())
+      what = "unknown option " + orbis::in_quotes(*option);
+    else if (is_extra && !rest.empty())
+      what = "unexpected argument " + orbis::in_quotes(rest.front());
+  }
   return orbis::shortened(what) + " (--help shows the usage)";
 }
 

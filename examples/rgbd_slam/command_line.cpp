@@ -511,10 +511,10 @@ std::variant<settings, exit_code> command_line::read(int argc, char** argv) {
   s = {};
   for (std::string* const text : {&origin, &gravity, &from, &to}) text->clear();
   const auto is_asked_for = [&](const CLI::App* command) { return command->get_name() == argv[1]; };
-  if (argc > 1 && argv[1][0] != '-' && cli.get_subcommands(is_asked_for).empty())
-    return report_error(
-        "no command " + orbis::in_quotes(argv[1]) + "; use run, live, demo, eval, map, plan, calibrate or benchmark",
-        bad_usage);
+  if (argc < 2 || (argv[1][0] != '-' && cli.get_subcommands(is_asked_for).empty()))
+    return report_error((argc < 2 ? std::string{"a command is missing"} : "no command " + orbis::in_quotes(argv[1])) +
+                            "; use run, live, demo, eval, map, plan, calibrate or benchmark (--help shows the usage)",
+                        bad_usage);
   try {
     cli.parse(argc, argv);
     examples::check_values(cli);

@@ -379,6 +379,13 @@ result<std::unique_ptr<camera_device>> open_device(const settings& s) {
   return open_openni(options);
 }
 
+/// Returns true if a folder contains the results of a run and no recording.
+bool is_result_folder(const std::filesystem::path& folder) {
+  std::error_code ignored;
+  return std::filesystem::exists(folder / "trajectory.txt", ignored) &&
+         std::filesystem::exists(folder / "camera_used.toml", ignored) && !is_recording(folder);
+}
+
 /// A camera that starts at the first request for a frame.
 struct lazy_live_source {
   std::unique_ptr<camera_device> device;
@@ -614,6 +621,8 @@ result<frame_source> open_source(const settings& s, console& console) {
     }
   };
   auto source = s.what == command::demo ? result<frame_source>{make_synthetic(s)} : open();
+  if (!source && is_result_folder(s.input))
+    return fail(orbis::errc::unsupported, s.input.string(), "contains the results of a run, not a recording");
   if (!source) return source;
   if (auto fits = check_images(*source, s); !fits) return fail(fits.error());
   if (source->is_stereo()) {
