@@ -151,10 +151,9 @@ orbis::result<void> write_navigation_picture(const navigation_picture& what, con
   }
   if (what.field != nullptr) {
     const double largest = largest_distance(what);
-    std::snprintf(text, sizeof text, "distance to obstacles%s at a height of %.2f m, 0 to %.2f m",
-                  largest < what.field->reach() ? " and floor" : "", what.height, largest);
+    std::snprintf(text, sizeof text, "clearance at a height of %.2f m, 0 to %.2f m", what.height, largest);
     panel(x, text, draw_slice(what, w, width, height), what.floor == nullptr || !what.drives,
-          {{at_obstacle, "at an obstacle"}, {far_off, "far from obstacles"}});
+          {{at_obstacle, "next to obstacles, floor or unknown space"}, {far_off, "far from them"}});
   }
   return s.write(path);
 }

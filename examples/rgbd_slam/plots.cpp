@@ -65,6 +65,8 @@ orbis::result<void> write_trajectory_picture(const results& r, const view_frame&
     s.line({1240, 64}, {1275, 64}, truth_color, 2.2);
     s.text("ground truth", {1285, 69}, ink, 13);
   }
+  s.dot({1257.5, compared ? 88.0 : 64.0}, estimate_color, 2.6);
+  s.text("keyframe", {1285, compared ? 93.0 : 69.0}, ink, 13);
 
   axes plan{s, 80, 125, 640, 630, x.padded(0.06, 0.2), y.padded(0.06, 0.2), true};
   add_frame_note(s, r, frame);
@@ -90,7 +92,7 @@ orbis::result<void> write_trajectory_picture(const results& r, const view_frame&
     off.curve(error, error_color, 1.6);
     const double rmse = 100 * r.against_truth->ate_rmse_m;
     off.curve({{time.low, rmse}, {time.high, rmse}}, faint, 1.0);
-    s.text("RMSE", off.place(time.low, rmse) + vec2(6, -5), faint, 11);
+    s.text("RMSE", off.place(time.high, rmse) + vec2(5, 4), faint, 11);
   }
   return s.write(r.folder / "trajectory.png");
 }

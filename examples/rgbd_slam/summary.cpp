@@ -196,12 +196,12 @@ std::string size_table(const map_results& m) {
 }
 
 std::string world_text(const world_results& w) {
-  const std::string sure = w.confidence ? text(" (confidence %.2f)", *w.confidence) : "";
   if (w.up_from == "loaded map") return "that of the loaded map";
-  if (w.up_from == "ground truth") return "that of the ground truth, with z up" + sure;
+  if (w.up_from == "ground truth") return "that of the ground truth, with z up";
   if (w.up_from == "gravity") return "z up, from --gravity";
   if (w.up_from == "assumed") return "z up, assuming a level camera at the first frame";
-  return "z up, from the " + w.up_from + " in the first depth image" + sure;
+  return "z up, from the " + w.up_from + " in the first depth image" +
+         (w.confidence ? text(" (%.0f %% of it)", 100.0 * *w.confidence) : "");
 }
 
 std::string removed_text(const map_results& m) {
