@@ -34,10 +34,12 @@ class keyframe_depths {
     finish();
     std::shared_future<void> ahead;
     if (background_)
-      ahead = start_in_background([this, frame, copy = depth] {
-                lower_priority(live_map_niceness);
-                keep(frame, copy);
-              }).share();
+      ahead = thread_
+                  .start([this, frame, copy = depth] {
+                    if (!std::exchange(has_priority_, true)) lower_priority(live_map_niceness);
+                    keep(frame, copy);
+                  })
+                  .share();
     if (!ahead.valid()) keep(frame, depth);
     const std::lock_guard lock{ahead_mutex_};
     ahead_ = std::move(ahead);
@@ -99,6 +101,8 @@ class keyframe_depths {
   bool background_;
   mutable std::mutex ahead_mutex_;
   std::shared_future<void> ahead_;  // compression of the last image
+  bool has_priority_ = false;       // true if the thread has its priority
+  background_thread thread_;        // uses the other members
 };
 
 /// The depth images of the live map, without the pixels that its filters removed. Models `mapping::masks_depth`.

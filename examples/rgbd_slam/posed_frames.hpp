@@ -180,7 +180,7 @@ class posed_frames {
     note_error(*images);
     if (background_ && number + 1 != entries_.size()) {
       ahead_number_ = number + 1;
-      ahead_ = start_in_background([this, next = number + 1] { return read(next); });
+      ahead_ = thread_->start([this, next = number + 1] { return read(next); });
     }
     return images;
   }
@@ -214,7 +214,8 @@ class posed_frames {
   color_file colors_;
   mutable std::optional<orbis::error> read_error_;
   mutable std::size_t ahead_number_ = 0;
-  mutable std::future<std::shared_ptr<unpacked>> ahead_;  // last member: waits before the others are destroyed
+  mutable std::future<std::shared_ptr<unpacked>> ahead_;
+  std::unique_ptr<background_thread> thread_ = std::make_unique<background_thread>();  // uses the other members
 };
 
 }  // namespace app

@@ -21,7 +21,6 @@
 #include "../common/memory.hpp"
 #include "../common/near_origin.hpp"
 #include "../common/voxel_estimate.hpp"
-#include "background.hpp"
 #include "camera_files.hpp"
 #include "formatted_text.hpp"
 #include "inputs/bag_file.hpp"
@@ -653,7 +652,7 @@ void frame_source::complete(source_frame& f) const {
 result<source_frame> read_ahead::next() {
   auto frame = ahead_.valid() ? ahead_.get() : source_.frame(at_);
   ++at_;
-  if (background_ && has_next()) ahead_ = start_in_background([this, i = at_] { return source_.frame(i); });
+  if (background_ && has_next()) ahead_ = thread_.start([this, i = at_] { return source_.frame(i); });
   return frame;
 }
 

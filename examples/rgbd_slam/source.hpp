@@ -16,6 +16,7 @@
 #include <orbis/core/trajectory.hpp>
 #include <orbis/slam/frame.hpp>
 
+#include "background.hpp"
 #include "console.hpp"
 #include "settings.hpp"
 
@@ -88,6 +89,7 @@ class read_ahead {
   bool background_;
   std::size_t at_ = 0;
   std::future<orbis::result<source_frame>> ahead_;
+  background_thread thread_;
 };
 
 }  // namespace app
