@@ -8,6 +8,7 @@
 #include <cassert>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <optional>
 
 #include <orbis/camera/depth.hpp>
@@ -92,51 +93,69 @@ template <camera::depth_source Depth>
   if (!(x > -0.5F && y > -0.5F && x < static_cast<float>(depth.width()) - 0.5F &&
         y < static_cast<float>(depth.height()) - 0.5F))
     return std::nullopt;
-  const int cx = static_cast<int>(std::lround(x));
-  const int cy = static_cast<int>(std::lround(y));
+  const int cx = static_cast<int>(static_cast<double>(x) + 0.5), cy = static_cast<int>(static_cast<double>(y) + 0.5);
 
-  std::array<float, (2 * max_radius + 1) * (2 * max_radius + 1)> z;
-  std::size_t count = 0;
-  const auto for_each_depth = [&](auto&& visit) {
-    for (int v = std::max(0, cy - options.radius); v <= std::min(depth.height() - 1, cy + options.radius); ++v)
-      for (int u = std::max(0, cx - options.radius); u <= std::min(depth.width() - 1, cx + options.radius); ++u)
-        if (const float metres = depth(u, v); metres > 0.0F) visit(u, v, metres);
+  struct valid_pixel {
+    int u, v;
+    float z;
   };
-  for_each_depth([&](int, int, float metres) { z[count++] = metres; });
+  constexpr std::size_t most = (2 * max_radius + 1) * (2 * max_radius + 1);
+  std::array<valid_pixel, most> valid;
+  std::size_t count = 0;
+  float least = std::numeric_limits<float>::max(), greatest = 0.0F;
+  for (int v = std::max(0, cy - options.radius); v <= std::min(depth.height() - 1, cy + options.radius); ++v)
+    for (int u = std::max(0, cx - options.radius); u <= std::min(depth.width() - 1, cx + options.radius); ++u)
+      if (const float metres = depth(u, v); metres > 0.0F) {
+        valid[count++] = {u, v, metres};
+        least = std::min(least, metres);
+        greatest = std::max(greatest, metres);
+      }
   if (count == 0 || static_cast<int>(count) < options.min_valid) return std::nullopt;
-  std::sort(z.begin(), z.begin() + static_cast<std::ptrdiff_t>(count));
 
-  // Finds the largest run of sorted depths without a gap; even a steep slope has no gaps.
+  std::array<float, most> z;
+  const auto sort = [&] {
+    for (std::size_t i = 0; i != count; ++i) z[i] = valid[i].z;
+    std::sort(z.begin(), z.begin() + static_cast<std::ptrdiff_t>(count));
+  };
   const auto is_edge = [&](float near, float far) {
     const double gap = static_cast<double>(far) - static_cast<double>(near);
     return gap > static_cast<double>(options.edge_sigmas) * options.noise(static_cast<double>(near)) &&
            gap > static_cast<double>(options.edge_relative) * static_cast<double>(near);
   };
-  std::size_t begin = 0;
-  std::size_t end = 0;
-  for (std::size_t first = 0, i = 1; i <= count; ++i) {
-    if (i != count && !is_edge(z[i - 1], z[i])) continue;
-    if (i - first > end - begin) {
-      begin = first;
-      end = i;
+  std::size_t begin = 0, end = count;
+  const bool is_even = !is_edge(least, greatest);  // if so, there is no edge between two of the depths, either
+  if (!is_even) {
+    // Finds the largest run of sorted depths without a gap; even a steep slope has no gaps.
+    sort();
+    end = 0;
+    for (std::size_t first = 0, i = 1; i <= count; ++i) {
+      if (i != count && !is_edge(z[i - 1], z[i])) continue;
+      if (i - first > end - begin) {
+        begin = first;
+        end = i;
+      }
+      first = i;
     }
-    first = i;
+    if (static_cast<float>(end - begin) < options.min_share * static_cast<float>(count)) return std::nullopt;
+    least = z[begin];
+    greatest = z[end - 1];
   }
-  if (static_cast<float>(end - begin) < options.min_share * static_cast<float>(count)) return std::nullopt;
 
-  const auto nearest = static_cast<double>(z[begin]), farthest = static_cast<double>(z[end - 1]);
+  const auto nearest = static_cast<double>(least), farthest = static_cast<double>(greatest);
   depth_plane plane;
-  for_each_depth([&](int u, int v, float metres) {
-    const auto m = static_cast<double>(metres);
-    if (m < nearest || m > farthest) return;
-    plane.add(static_cast<double>(u) - static_cast<double>(x), static_cast<double>(v) - static_cast<double>(y), m);
-  });
+  for (std::size_t i = 0; i != count; ++i) {
+    const valid_pixel& p = valid[i];
+    if (p.z < least || p.z > greatest) continue;
+    plane.add(static_cast<double>(p.u) - static_cast<double>(x), static_cast<double>(p.v) - static_cast<double>(y),
+              static_cast<double>(p.z));
+  }
   if (plane.determined()) {
     const auto fit = plane.solve();
     const double at = std::clamp(fit.z, nearest, farthest);  // prevents extrapolation into a hole
     const double noise = options.noise(at), shift = fit.slope * options.position_sigma;
     return keypoint_depth{at, std::sqrt(noise * noise + fit.variance + shift * shift)};
   }
+  if (is_even) sort();
   const std::size_t middle = begin + (end - begin) / 2;
   const auto upper = static_cast<double>(z[middle]);
   const double median = (end - begin) % 2 == 1 ? upper : 0.5 * (upper + static_cast<double>(z[middle - 1]));

@@ -100,7 +100,7 @@ class keypoint_grid {
   [[nodiscard]] int column_at(float x) const noexcept { return index_at(x, left_, columns_); }
   [[nodiscard]] int row_at(float y) const noexcept { return index_at(y, top_, rows_); }
   [[nodiscard]] int index_at(float at, float origin, int count) const noexcept {
-    const double cell = std::floor((static_cast<double>(at) - static_cast<double>(origin)) * inverse_cell_);
+    const double cell = (static_cast<double>(at) - static_cast<double>(origin)) * inverse_cell_;
     return static_cast<int>(std::clamp(cell, 0.0, static_cast<double>(count - 1)));
   }
   [[nodiscard]] std::size_t cell_of(const keypoint& k) const noexcept {
