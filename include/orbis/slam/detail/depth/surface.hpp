@@ -7,6 +7,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -14,6 +15,9 @@
 
 #include <orbis/camera/depth.hpp>
 #include <orbis/camera/model.hpp>
+#include <orbis/core/simd/dispatch.hpp>
+#include <orbis/core/simd/math.hpp>
+#include <orbis/core/simd/vec.hpp>
 #include <orbis/core/types.hpp>
 
 namespace orbis::slam::detail {
@@ -51,6 +55,86 @@ struct surface {
   }
 };
 
+/// The mean depth of each cell of an image, with a border of empty cells.
+struct cell_depths {
+  static constexpr int border = 2;  ///< width of the border, cells; on the right, it is wider
+  std::size_t stride = 0;           ///< number of cells in a row, including the border
+  std::vector<float> x, y;          ///< ray through the mean pixel, at z = 1
+  std::vector<float> inverse;       ///< inverse depth, 1/m; 0 if the cell has no depth
+
+  /// Sets the size of the image, in cells. All cells are empty if it changes.
+  void resize(int columns, int rows) {
+    constexpr std::size_t lanes = 8;
+    stride = (static_cast<std::size_t>(columns) + lanes - 1) / lanes * lanes + 2 * border;
+    const std::size_t cells = stride * (static_cast<std::size_t>(rows) + 2 * border);
+    if (inverse.size() == cells) return;
+    for (auto* const v : {&x, &y, &inverse}) v->assign(cells, 0.0F);
+  }
+  [[nodiscard]] std::size_t index(int column, int row) const noexcept {
+    return (static_cast<std::size_t>(row) + border) * stride + static_cast<std::size_t>(column) + border;
+  }
+};
+
+/// Fits a plane to each cell of a row and the surrounding cells on the same surface.
+struct fit_row_kernel {
+  using signature = void(const cell_depths&, int row, int columns, float noise, surface_cell* to);
+
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const cell_depths& of, int row, int columns, float noise, surface_cell* to) {
+    using lanes = simd::vec<float, 8, Target>;
+    constexpr int radius = cell_depths::border;
+    constexpr float enough = 12.0F;    // cells
+    constexpr float steepest = 0.05F;  // relative change of depth from cell to cell
+    constexpr float grazing = 0.17F;   // cosine of the angle between ray and normal
+    const lanes none(0.0F), one(1.0F);
+    for (int column = 0; column < columns; column += 8) {
+      const std::size_t middle = of.index(column, row);
+      const lanes mx = lanes::load(&of.x[middle]), my = lanes::load(&of.y[middle]);
+      const lanes mw = lanes::load(&of.inverse[middle]);
+      lanes n = none, sx = none, sy = none, sw = none;
+      lanes sxx = none, sxy = none, syy = none, sxw = none, syw = none, sww = none;
+      for (int r = -radius; r <= radius; ++r)
+        for (int c = -radius; c <= radius; ++c) {
+          const std::size_t at = of.index(column + c, row + r);
+          const lanes inverse = lanes::load(&of.inverse[at]);
+          const lanes away(static_cast<float>(std::max(std::abs(r), std::abs(c))) * steepest);
+          const lanes apart = inverse - mw;
+          const auto used = (none < inverse) & (abs(apart) <= away * mw + lanes(2.0F * noise));
+          const auto kept = [&](const lanes& v) ORBIS_INLINE_LAMBDA { return select(used, v, none); };
+          const lanes x = kept(lanes::load(&of.x[at]) - mx), y = kept(lanes::load(&of.y[at]) - my), w = kept(apart);
+          n += kept(one);
+          sx += x, sy += y, sw += w;
+          sxx += x * x, sxy += x * y, syy += y * y;
+          sxw += x * w, syw += y * w, sww += w * w;
+        }
+      const lanes count = max(n, one);
+      sxx -= sx * sx / count, sxy -= sx * sy / count, syy -= sy * sy / count;
+      sxw -= sx * sw / count, syw -= sy * sw / count, sww -= sw * sw / count;
+      const lanes det = sxx * syy - sxy * sxy;
+      const lanes a = (syy * sxw - sxy * syw) / det, b = (sxx * syw - sxy * sxw) / det;
+      const lanes rest = max(none, sww - a * sxw - b * syw) / count;
+      const lanes most = lanes(0.5F * noise) + lanes(0.006F) * mw;
+      const lanes inverse = mw + (sw - a * sx - b * sy) / count;
+      // The plane consists of all points p with (a, b, c) . p = 1.
+      const lanes c = inverse - a * mx - b * my;
+      const lanes length = sqrt(a * a + b * b + c * c);
+      const lanes slant = inverse / (length * sqrt(mx * mx + my * my + one));
+      const auto fits = (none < mw) & (lanes(enough) <= n) & (lanes(0.05F) * sxx * syy < det) & (rest <= most * most) &
+                        (none < inverse) & (lanes(grazing) <= slant);
+      const lanes z = select(fits, one / inverse, none);
+      std::array<std::array<float, 8>, 7> out;
+      std::size_t next = 0;
+      for (const lanes& v : {mx * z, my * z, z, none - a / length, none - b / length, none - c / length, one / mw})
+        v.store(out[next++].data());
+      const auto last = static_cast<std::size_t>(std::min(8, columns - column));
+      for (std::size_t i = 0; i != last; ++i)
+        to[static_cast<std::size_t>(column) + i] =
+            out[2][i] > 0.0F ? surface_cell{out[0][i], out[1][i], out[2][i], out[3][i], out[4][i], out[5][i], out[6][i]}
+                             : surface_cell{};
+    }
+  }
+};
+
 /// Builds surfaces from the depth images of one camera. Reuses its own memory and that of the surface.
 template <camera::camera_model Camera>
 class surface_builder {
@@ -65,22 +149,19 @@ class surface_builder {
     to.rows = depth.height() / to.step;
     const auto cells = static_cast<std::size_t>(to.columns) * static_cast<std::size_t>(to.rows);
     if (rays_.size() != cells) find_rays(camera, to);
-    samples_.resize(cells);
+    depths_.resize(to.columns, to.rows);
     to.cells.resize(cells);
     const sampling how{to.step, static_cast<float>(min_depth), static_cast<float>(max_depth),
                        static_cast<float>(4.0 * noise)};
     for (int row = 0; row != to.rows; ++row)
       for (int column = 0; column != to.columns; ++column) sample(depth, how, column, row, to.columns);
+    const auto fit_row = simd::kernel<fit_row_kernel, fit_row_kernel::signature>();
     for (int row = 0; row != to.rows; ++row)
-      for (int column = 0; column != to.columns; ++column) fit(column, row, static_cast<float>(noise), to);
+      fit_row(depths_, row, to.columns, static_cast<float>(noise),
+              to.cells.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(to.columns));
   }
 
  private:
-  /// The mean of the depths in a cell.
-  struct sampled {
-    float x, y;     ///< ray through the mean pixel, at z = 1
-    float inverse;  ///< inverse depth, 1/m; 0 if the cell has no depth
-  };
   struct ray {
     float x, y;        ///< ray through the centre of the cell; NaN if there is none
     float by_u, by_v;  ///< change per pixel
@@ -107,8 +188,6 @@ class surface_builder {
   void sample(const Depth& depth, const sampling& how, int column, int row, int columns) {
     constexpr int across = 4, enough = 9;
     constexpr float steepest = 0.08F;  // relative change of depth within a cell
-    const auto index =
-        static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(column);
     float sum = 0.0F, least = std::numeric_limits<float>::max(), most = 0.0F;
     int count = 0, sum_u = 0, sum_v = 0;
     for (int j = 0; j != across; ++j)
@@ -125,64 +204,22 @@ class surface_builder {
         sum_u += u;
         sum_v += v;
       }
-    sampled& s = samples_[index];
-    s.inverse = 0.0F;
+    const std::size_t cell = depths_.index(column, row);
+    depths_.inverse[cell] = 0.0F;
     if (count < enough || most - least > steepest * least + how.jump) return;
-    const ray& r = rays_[index];
+    const ray& r =
+        rays_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(column)];
+    if (std::isnan(r.x)) return;
     const float n = static_cast<float>(count), step = static_cast<float>(how.step);
     const float du = static_cast<float>(sum_u) / n - (static_cast<float>(column) + 0.5F) * step + 0.5F;
     const float dv = static_cast<float>(sum_v) / n - (static_cast<float>(row) + 0.5F) * step + 0.5F;
-    s = {r.x + du * r.by_u, r.y + dv * r.by_v, std::isnan(r.x) ? 0.0F : sum / n};
-  }
-
-  /// Fits a plane to a cell and the surrounding cells on the same surface.
-  void fit(int column, int row, float noise, surface& to) const {
-    constexpr int radius = 2, enough = 12;
-    constexpr float steepest = 0.05F;  // relative change of depth from cell to cell
-    const auto at = [&](int c, int r) -> const sampled& {
-      return samples_[static_cast<std::size_t>(r) * static_cast<std::size_t>(to.columns) + static_cast<std::size_t>(c)];
-    };
-    surface_cell& cell = to.cells[static_cast<std::size_t>(row) * static_cast<std::size_t>(to.columns) +
-                                  static_cast<std::size_t>(column)];
-    cell = {};
-    const sampled& middle = at(column, row);
-    if (!(middle.inverse > 0.0F)) return;
-    float n = 0.0F, sx = 0.0F, sy = 0.0F, sw = 0.0F, sxx = 0.0F, sxy = 0.0F, syy = 0.0F, sxw = 0.0F, syw = 0.0F,
-          sww = 0.0F;
-    for (int r = std::max(0, row - radius); r <= std::min(to.rows - 1, row + radius); ++r)
-      for (int c = std::max(0, column - radius); c <= std::min(to.columns - 1, column + radius); ++c) {
-        const sampled& s = at(c, r);
-        const float away = static_cast<float>(std::max(std::abs(r - row), std::abs(c - column)));
-        const float w = s.inverse - middle.inverse;
-        if (!(s.inverse > 0.0F) || std::abs(w) > away * steepest * middle.inverse + 2.0F * noise) continue;
-        const float x = s.x - middle.x, y = s.y - middle.y;
-        n += 1.0F;
-        sx += x, sy += y, sw += w;
-        sxx += x * x, sxy += x * y, syy += y * y;
-        sxw += x * w, syw += y * w, sww += w * w;
-      }
-    if (n < static_cast<float>(enough)) return;
-    sxx -= sx * sx / n, sxy -= sx * sy / n, syy -= sy * sy / n;
-    sxw -= sx * sw / n, syw -= sy * sw / n, sww -= sw * sw / n;
-    const float det = sxx * syy - sxy * sxy;
-    if (!(det > 0.05F * sxx * syy)) return;
-    const float a = (syy * sxw - sxy * syw) / det, b = (sxx * syw - sxy * sxw) / det;
-    const float rest = std::max(0.0F, sww - a * sxw - b * syw) / n;
-    const float most = 0.5F * noise + 0.006F * middle.inverse;
-    const float inverse = middle.inverse + (sw - a * sx - b * sy) / n;
-    if (rest > most * most || !(inverse > 0.0F)) return;
-    // The plane consists of all points p with (a, b, c) . p = 1.
-    const float c = inverse - a * middle.x - b * middle.y;
-    const float length = std::sqrt(a * a + b * b + c * c);
-    const float slant = inverse / (length * std::sqrt(middle.x * middle.x + middle.y * middle.y + 1.0F));
-    constexpr float grazing = 0.17F;  // cosine of the angle between ray and normal
-    if (slant < grazing) return;
-    const float z = 1.0F / inverse;
-    cell = {middle.x * z, middle.y * z, z, -a / length, -b / length, -c / length, 1.0F / middle.inverse};
+    depths_.x[cell] = r.x + du * r.by_u;
+    depths_.y[cell] = r.y + dv * r.by_v;
+    depths_.inverse[cell] = sum / n;
   }
 
   std::vector<ray> rays_;
-  std::vector<sampled> samples_;
+  cell_depths depths_;
 };
 
 }  // namespace orbis::slam::detail
