@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <optional>
 
 #include <orbis/core/image.hpp>
@@ -230,18 +231,22 @@ struct match_patch_kernel {
         const lanes u = max(lanes(0.0F), min(right, lanes(static_cast<float>(begin.x())) + step_x));
         const lanes v = max(lanes(0.0F), min(bottom, lanes(static_cast<float>(begin.y())) + step_y));
         const integers left = simd::convert<std::int32_t>(u), top = simd::convert<std::int32_t>(v);
-        std::array<std::int32_t, 8> columns, rows, a, b, c, d;
+        // Two neighbouring pixels of a row are read at once.
+        std::array<std::int32_t, 8> columns, rows;
+        std::array<std::uint16_t, 8> upper_pairs, lower_pairs;
         left.store(columns.data()), top.store(rows.data());
         for (std::size_t k = 0; k != 8; ++k) {
-          const std::uint8_t* const upper = &image(columns[k], rows[k]);
-          const std::uint8_t* const lower = &image(columns[k], rows[k] + 1);
-          a[k] = upper[0], b[k] = upper[1], c[k] = lower[0], d[k] = lower[1];
+          const std::uint8_t* const at = &image(columns[k], rows[k]);
+          std::memcpy(&upper_pairs[k], at, 2);
+          std::memcpy(&lower_pairs[k], at + image.stride(), 2);
         }
-        const auto numbers = [](const std::array<std::int32_t, 8>& n)
-                                 ORBIS_INLINE_LAMBDA { return simd::convert<float>(integers::load(n.data())); };
         const lanes fx = u - simd::convert<float>(left), fy = v - simd::convert<float>(top);
-        const lanes na = numbers(a), nc = numbers(c);
-        const lanes upper = na + fx * (numbers(b) - na), lower = nc + fx * (numbers(d) - nc);
+        const auto between = [&](const std::array<std::uint16_t, 8>& pairs) ORBIS_INLINE_LAMBDA {
+          const integers both = simd::convert<std::int32_t>(simd::vec<std::uint16_t, 8, Target>::load(pairs.data()));
+          const lanes first = simd::convert<float>(both & integers(255)), second = simd::convert<float>(both >> 8);
+          return first + fx * (second - first);
+        };
+        const lanes upper = between(upper_pairs), lower = between(lower_pairs);
         (upper + fy * (lower - upper)).store(to + y * stride + x);
       }
     return true;
