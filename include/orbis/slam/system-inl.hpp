@@ -67,13 +67,8 @@ track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const rgb8> c
   };
   if (options_.estimates_shutter) {
     // The image is read again when the next frame has been tracked.
-    image<float>& kept = read_later_[front_end_->counters().frames % 2];
-    if (kept.width() != depth.width()) kept = image<float>(depth.width(), depth.height());
-    for (int y = 0; y != depth.height(); ++y)
-      for (int x = 0; x != depth.width(); ++x) kept(x, y) = depth(x, y);
-    read = [this, &kept](std::span<keypoint_as_read> seen, const frame_motion& m) {
-      follow_rows(shared_.rig, m, seen, camera::depth_view<float>{std::as_const(kept).view()});
-    };
+    read = [this, kept = read_later_[front_end_->counters().frames % 2].keep(depth)](
+               std::span<keypoint_as_read> seen, const frame_motion& m) { follow_rows(shared_.rig, m, seen, kept); };
   }
   return track_frame(timestamp, std::move(f), read, clock);
 }

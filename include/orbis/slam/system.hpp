@@ -40,6 +40,7 @@
 #include <orbis/features/orb.hpp>
 #include <orbis/slam/atlas.hpp>
 #include <orbis/slam/camera_rig.hpp>
+#include <orbis/slam/detail/depth/depth_copy.hpp>
 #include <orbis/slam/detail/system/shared_state.hpp>
 #include <orbis/slam/events.hpp>
 #include <orbis/slam/extractor.hpp>
@@ -225,7 +226,8 @@ class system {
   stereo_memory stereo_;
   image_memory image_;
   camera::depth_clock depth_clock_;
-  std::array<image<float>, 2> read_later_;  ///< the depth images of the last two frames, while the shutter is estimated
+  std::array<detail::depth_copy, 2>
+      read_later_;  ///< the depth images of the last two frames, while the shutter is estimated
   detail::shared_state<Camera, descriptor_type, Places> shared_;
   std::unique_ptr<front_end> front_end_;
   track_state reported_state_ = track_state::not_started;
