@@ -86,12 +86,12 @@ result<homography_estimate> estimate_homography(std::span<const vec2> first, std
   ransac_options asked = detail::ransac_part(options);
   if (const char* const fault = detail::find_fault(asked)) return fail(errc::invalid_argument, where, fault);
   if (n < 4) return fail(errc::no_data, where, "fewer than four matches");
-  std::vector<typename estimator_type::match> matches;
+  std::vector<detail::image_match> matches;
   matches.reserve(n);
   vec2 first_centre = zeros<vec2>(), second_centre = zeros<vec2>();
   for (std::size_t i = 0; i != n; ++i) {
     if (!all_finite(first[i]) || !all_finite(second[i])) continue;
-    matches.push_back({first[i], second[i], static_cast<std::uint32_t>(i)});
+    matches.push_back({{first[i].x(), first[i].y()}, {second[i].x(), second[i].y()}, static_cast<std::uint32_t>(i)});
     first_centre += first[i];
     second_centre += second[i];
   }
@@ -105,20 +105,22 @@ result<homography_estimate> estimate_homography(std::span<const vec2> first, std
   // magnitudes.
   double size = 0.0;
   mat2 first_spread = zeros<mat2>(), second_spread = zeros<mat2>();
-  for (auto& m : matches) {
-    m.first -= first_centre;
-    m.second -= second_centre;
-    first_spread += m.first * transposed(m.first);
-    second_spread += m.second * transposed(m.second);
+  const auto centre = [](detail::metric_ray& r, const vec2& at, mat2& spread) {
+    const vec2 offset(r.x - at.x(), r.y - at.y());
+    spread += offset * transposed(offset);
+    r.x = offset.x();
+    r.y = offset.y();
+  };
+  for (detail::image_match& m : matches) {
+    centre(m.first, first_centre, first_spread);
+    centre(m.second, second_centre, second_spread);
   }
   size = std::sqrt((trace(first_spread) + trace(second_spread)) / static_cast<double>(2 * matches.size()));
   const double threshold = options.threshold / size;
   if (!(size > 0.0) || !std::isfinite(threshold))
     return fail(errc::degenerate, where, "all points are collinear or coincident");
-  for (auto& m : matches) {
-    m.first /= size;
-    m.second /= size;
-  }
+  for (detail::image_match& m : matches)
+    for (double* const v : {&m.first.x, &m.first.y, &m.second.x, &m.second.y}) *v /= size;
   random_bits random(mix64(options.seed));
   shuffle(matches, random);
 

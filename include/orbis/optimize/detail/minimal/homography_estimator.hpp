@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The RANSAC estimator of homographies.
+/// The RANSAC estimator of homographies between the rays of two cameras of any model, with errors in pixels.
 #pragma once
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -16,6 +18,7 @@
 #include <orbis/core/small_cholesky.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/detail/minimal/descent.hpp>
+#include <orbis/optimize/detail/minimal/image_matches.hpp>
 #include <orbis/optimize/ransac.hpp>
 
 namespace orbis::optimize::detail {
@@ -47,30 +50,33 @@ namespace orbis::optimize::detail {
   return out;
 }
 
-/// Normal equations of transfer errors for D in (I + D) H, where the last entry of D is 0. Only the lower triangle of
-/// `h` is used. `cost` is the sum of squares.
+/// Normal equations of transfer errors for D in (I + D) H, row by row; the last entry of D is 0. Only the lower
+/// triangle of `h` is used. `cost` is the sum of squares.
 struct homography_equations {
-  matrix<8, 8> h = zeros<matrix<8, 8>>();
-  matrix<8> g = zeros<matrix<8>>();
+  matrix<9, 9> h = zeros<matrix<9, 9>>();
+  matrix<9> g = zeros<matrix<9>>();
   double cost = 0.0;
 
   /// Adds the error `r` of a point. `by_point` is the derivative of `r` with respect to the point before projection; a
   /// small D moves that point by `by_d * D * moved`.
   void add(const vec2& r, const matrix<2, 3>& by_point, const mat3& by_d, const vec3& moved) {
+    // The derivative with respect to entry (i, k) of D is column i of `a` times entry k of `moved`.
     const matrix<2, 3> a = by_point * by_d;
-    matrix<2, 8> j;
-    for (int k = 0; k != 8; ++k) set_column(j, k, column_of(a, k / 3) * moved[k % 3]);
-    for (int k = 0; k != 8; ++k) {
-      for (int l = k; l != 8; ++l) h(l, k) += j(0, l) * j(0, k) + j(1, l) * j(1, k);
-      g[k] += j(0, k) * r[0] + j(1, k) * r[1];
+    const mat3 squares = transposed(a) * a, products = outer_product(moved, moved);
+    const vec3 pull = transposed(a) * r;
+    for (int i = 0; i != 3; ++i) {
+      for (int j = 0; j <= i; ++j)
+        for (int k = 0; k != 3; ++k)
+          for (int l = 0; l != 3; ++l) h(3 * i + k, 3 * j + l) += squares(i, j) * products(k, l);
+      for (int k = 0; k != 3; ++k) g[3 * i + k] += pull[i] * moved[k];
     }
     cost += squared_norm(r);
   }
   /// Returns I + D for a Gauss-Newton step; empty if the equations do not determine a step.
   [[nodiscard]] std::optional<mat3> step() const {
     small_cholesky<8> factors;
-    if (!factors.set(h) || !(factors.factor(1e-9) > 0.0)) return std::nullopt;
-    const matrix<8> entries = -factors.solve(g);
+    if (!factors.set(block<8, 8>(h, 0, 0)) || !(factors.factor(1e-9) > 0.0)) return std::nullopt;
+    const matrix<8> entries = -factors.solve(head<8>(g));
     if (!all_finite(entries)) return std::nullopt;
     mat3 d = identity<mat3>();
     for (int j = 0; j != 8; ++j) d(j / 3, j % 3) += entries[j];
@@ -85,62 +91,59 @@ struct homography_equations {
   return projection;
 }
 
+/// Returns the squared distance, in the unit of `metric_ray`, of a transferred ray from the observed one; infinite if
+/// the transferred ray points behind the camera.
+[[nodiscard]] inline double squared_transfer(const vec3& p, const metric_ray& seen) {
+  if (!(p.z() > 0.0)) return std::numeric_limits<double>::infinity();
+  const double dx = p.x() / p.z() - seen.x, dy = p.y() / p.z() - seen.y;
+  const double u = seen.xx * dx + seen.xy * dy, v = seen.yy * dy;
+  return u * u + v * v;
+}
+
+/// Estimates a homography from matches of rays. For matches of pixels, the rays are the pixels themselves, with the
+/// identity as their metric.
 class homography_estimator {
  public:
   struct model {
-    mat3 forward, backward;
+    mat3 forward, backward;  ///< both matrices give positive z for rays that are transferred to the front of the camera
   };
   static constexpr std::size_t sample_size = 4;
 
-  struct match {
-    vec2 first, second;
-    std::uint32_t original;
-  };
-
-  explicit homography_estimator(const std::vector<match>& matches) : matches_{matches} {
-    for (const match& m : matches) {
-      const std::array values{m.first.x(), m.first.y(), m.second.x(), m.second.y()};
-      for (std::size_t k = 0; k != 4; ++k) columns_[k].push_back(static_cast<float>(values[k]));
+  explicit homography_estimator(const std::vector<image_match>& matches) : matches_{matches} {
+    const std::size_t size = (matches.size() + consensus_block - 1) / consensus_block * consensus_block;
+    for (auto& column : columns_) column.resize(size);
+    for (std::size_t i = 0; i != matches.size(); ++i) {
+      std::size_t next = 0;
+      for (const metric_ray& r : {matches[i].first, matches[i].second})
+        for (const double v : {r.x, r.y, r.xx, r.xy, r.yy}) columns_[next++][i] = static_cast<float>(v);
     }
-    for (auto& column : columns_)
-      column.resize((matches.size() + consensus_block - 1) / consensus_block * consensus_block);
   }
 
   [[nodiscard]] std::size_t size() const noexcept { return matches_.size(); }
 
   [[nodiscard]] one_or_none<model> fit(const std::array<std::uint32_t, 4>& s) const {
-    const auto h = homography_of_four(
-        {matches_[s[0]].first, matches_[s[1]].first, matches_[s[2]].first, matches_[s[3]].first},
-        {matches_[s[0]].second, matches_[s[1]].second, matches_[s[2]].second, matches_[s[3]].second});
+    std::array<vec2, 4> first, second;
+    for (std::size_t i = 0; i != 4; ++i) {
+      const image_match& m = matches_[s[i]];
+      first[i] = {m.first.x, m.first.y};
+      second[i] = {m.second.x, m.second.y};
+    }
+    const auto h = homography_of_four(first, second);
     if (!h) return {};
-    return {make_model(*h)};
+    return {make_model(*h, matches_[s[0]].first.direction())};
   }
 
+  /// Returns the mean of the squared errors of both transfers.
   [[nodiscard]] double squared_error(const model& m, std::size_t i) const {
-    const match& x = matches_[i];
-    const vec3 p = m.forward * homogeneous(x.first), q = m.backward * homogeneous(x.second);
-    return 0.5 * (squared_norm(head<2>(p) / p.z() - x.second) + squared_norm(head<2>(q) / q.z() - x.first));
+    const image_match& x = matches_[i];
+    return 0.5 * (squared_transfer(m.forward * x.first.direction(), x.second) +
+                  squared_transfer(m.backward * x.second.direction(), x.first));
   }
 
   void squared_errors(const model& m, std::size_t first, std::span<float, consensus_block> out) const {
-    std::array<float, 9> f, b;
-    for (int k = 0; k != 9; ++k) {
-      f[static_cast<std::size_t>(k)] = static_cast<float>(m.forward(k / 3, k % 3));
-      b[static_cast<std::size_t>(k)] = static_cast<float>(m.backward(k / 3, k % 3));
-    }
     std::array<float, consensus_block> errors;
-    const float* const x = columns_[0].data() + first;
-    const float* const y = columns_[1].data() + first;
-    const float* const u = columns_[2].data() + first;
-    const float* const v = columns_[3].data() + first;
-    for (std::size_t i = 0; i != consensus_block; ++i) {
-      const float pz = 1.0F / (f[6] * x[i] + f[7] * y[i] + f[8]), qz = 1.0F / (b[6] * u[i] + b[7] * v[i] + b[8]);
-      const float px = (f[0] * x[i] + f[1] * y[i] + f[2]) * pz - u[i];
-      const float py = (f[3] * x[i] + f[4] * y[i] + f[5]) * pz - v[i];
-      const float qx = (b[0] * u[i] + b[1] * v[i] + b[2]) * qz - x[i];
-      const float qy = (b[3] * u[i] + b[4] * v[i] + b[5]) * qz - y[i];
-      errors[i] = 0.5F * ((px * px + py * py) + (qx * qx + qy * qy));
-    }
+    add_transfers<false>(m.forward, first, columns_.data(), columns_.data() + 5, errors);
+    add_transfers<true>(m.backward, first, columns_.data() + 5, columns_.data(), errors);
     std::copy(errors.begin(), errors.end(), out.begin());
   }
 
@@ -150,40 +153,71 @@ class homography_estimator {
   }
   [[nodiscard]] std::optional<model> refine(const model& start, std::span<const std::uint32_t> inliers,
                                             int steps) const {
-    const auto step = [](const model& m, const homography_equations& e) -> std::optional<model> {
+    if (inliers.empty()) return std::nullopt;
+    const vec3 in_front = matches_[inliers.front()].first.direction();
+    const auto step = [&](const model& m, const homography_equations& e) -> std::optional<model> {
       const auto d = e.step();
       if (!d) return std::nullopt;
-      return make_model(*d * m.forward);
+      return make_model(*d * m.forward, in_front);
     };
     return descend(
         start, steps, [&](const model& m) { return sum_up(m, inliers); }, step);
   }
 
  private:
-  [[nodiscard]] static model make_model(const mat3& h) {
+  using column = std::vector<float>;
+
+  /// Creates a model from a homography; empty if the homography is singular.
+  [[nodiscard]] static std::optional<model> make_model(const mat3& h, const vec3& in_front) {
     model m{h / norm(h), inverse(h)};
+    if ((m.forward * in_front).z() < 0.0) m.forward = -m.forward;
     m.backward /= norm(m.backward);
+    if ((m.backward * (m.forward * in_front)).z() < 0.0) m.backward = -m.backward;
+    if (!all_finite(m.forward) || !all_finite(m.backward)) return std::nullopt;
     return m;
+  }
+
+  /// Sets `errors` to half the `squared_transfer` of a block of matches, or adds it. Rays that are transferred behind
+  /// the camera are rare; they are only excluded from the inliers.
+  template <bool Add>
+  static void add_transfers(const mat3& h, std::size_t first, const column* from, const column* to,
+                            std::array<float, consensus_block>& errors) {
+    std::array<float, 9> m;
+    for (int k = 0; k != 9; ++k) m[static_cast<std::size_t>(k)] = static_cast<float>(h(k / 3, k % 3));
+    const float *const x = from[0].data() + first, *const y = from[1].data() + first;
+    const float *const u = to[0].data() + first, *const v = to[1].data() + first;
+    const float *const xx = to[2].data() + first, *const xy = to[3].data() + first, *const yy = to[4].data() + first;
+    for (std::size_t i = 0; i != consensus_block; ++i) {
+      const float inverse = 1.0F / (m[6] * x[i] + m[7] * y[i] + m[8]);
+      const float dx = (m[0] * x[i] + m[1] * y[i] + m[2]) * inverse - u[i];
+      const float dy = (m[3] * x[i] + m[4] * y[i] + m[5]) * inverse - v[i];
+      const float a = xx[i] * dx + xy[i] * dy, b = yy[i] * dy;
+      const float error = 0.5F * (a * a + b * b);
+      errors[i] = Add ? errors[i] + error : error;
+    }
   }
 
   [[nodiscard]] homography_equations sum_up(const model& m, std::span<const std::uint32_t> inliers) const {
     homography_equations e;
     for (const std::uint32_t i : inliers) {
-      const match& x = matches_[i];
-      const auto add = [&](const vec3& p, const vec2& seen, const mat3& by_d, const vec3& moved) {
+      const image_match& x = matches_[i];
+      const auto add = [&](const vec3& p, const metric_ray& seen, const mat3& by_d, const vec3& moved) {
         const double inverse = 1.0 / p.z();
         const vec2 xy = head<2>(p) * inverse;
-        e.add(xy - seen, derivative_of_projection(xy, inverse), by_d, moved);
+        mat2 metric;
+        metric << seen.xx, seen.xy, 0.0, seen.yy;
+        const vec2 r = metric * vec2(xy.x() - seen.x, xy.y() - seen.y);
+        e.add(r, metric * derivative_of_projection(xy, inverse), by_d, moved);
       };
-      const vec3 p = m.forward * homogeneous(x.first);
+      const vec3 p = m.forward * x.first.direction();
       add(p, x.second, identity<mat3>(), p);
-      add(m.backward * homogeneous(x.second), x.first, -m.backward, homogeneous(x.second));
+      add(m.backward * x.second.direction(), x.first, -m.backward, x.second.direction());
     }
     return e;
   }
 
-  const std::vector<match>& matches_;
-  std::array<std::vector<float>, 4> columns_;
+  const std::vector<image_match>& matches_;
+  std::array<column, 10> columns_;  // x, y, xx, xy and yy of the first and of the second rays
 };
 
 }  // namespace orbis::optimize::detail

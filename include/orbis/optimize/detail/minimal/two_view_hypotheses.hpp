@@ -23,9 +23,9 @@
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/detail/minimal/epipolar_motion.hpp>
 #include <orbis/optimize/detail/minimal/essential_estimator.hpp>
+#include <orbis/optimize/detail/minimal/homography_estimator.hpp>
 #include <orbis/optimize/detail/minimal/horn.hpp>
 #include <orbis/optimize/detail/minimal/image_matches.hpp>
-#include <orbis/optimize/detail/minimal/ray_homography_estimator.hpp>
 
 namespace orbis::optimize::detail {
 

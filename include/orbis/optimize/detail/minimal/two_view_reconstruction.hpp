@@ -20,8 +20,8 @@
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/detail/minimal/epipolar_motion.hpp>
 #include <orbis/optimize/detail/minimal/essential_estimator.hpp>
+#include <orbis/optimize/detail/minimal/homography_estimator.hpp>
 #include <orbis/optimize/detail/minimal/image_matches.hpp>
-#include <orbis/optimize/detail/minimal/ray_homography_estimator.hpp>
 #include <orbis/optimize/detail/minimal/two_view_hypotheses.hpp>
 #include <orbis/optimize/ransac.hpp>
 #include <orbis/optimize/triangulation.hpp>
@@ -247,7 +247,7 @@ result<two_view_reconstruction> reconstruction_of_matches(const std::vector<Matc
   ransac_options of_planes = asked;
   of_planes.threshold = std::sqrt(point_gate);
   of_planes.model_cost = 200.0;
-  const auto plane = ransac(ray_homography_estimator(matches), of_planes);
+  const auto plane = ransac(homography_estimator(matches), of_planes);
 
   // Add the motions of both models: those of the model with the lower score are also rivals.
   two_view_search<Match> search(matches);
