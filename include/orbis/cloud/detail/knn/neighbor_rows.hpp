@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -141,6 +142,23 @@ inline float write_row(rank_sorter& gathered, std::uint32_t self, std::span<neig
   return last_squared;
 }
 
+/// Writes the nearest of the given points, excluding the point itself, as a row of one, without sorting. Returns the
+/// squared distance to it.
+inline float write_nearest(std::span<const float> squared, const std::uint32_t* places, const std::uint32_t* members,
+                           std::uint32_t self, neighbor<float>& row) {
+  constexpr std::uint64_t none = std::numeric_limits<std::uint64_t>::max();
+  std::uint64_t nearest = none;  // squared distance and index; the minimum is found without branches
+  for (std::size_t i = 0; i != squared.size(); ++i) {
+    const std::uint32_t index = members[places[i]];
+    const std::uint64_t here = std::uint64_t{std::bit_cast<std::uint32_t>(squared[i])} << 32U | index;
+    nearest = std::min(nearest, index == self ? none : here);
+  }
+  if (nearest == none) return 0.0F;
+  const auto least = std::bit_cast<float>(static_cast<std::uint32_t>(nearest >> 32U));
+  row = {static_cast<std::uint32_t>(nearest), std::sqrt(least)};
+  return least;
+}
+
 /// Writes the row of the i-th point of leaf `l` from the search result `found`, complete up to squared distance
 /// `bound`. Returns the squared distance to the last neighbour. `gathered` is scratch.
 ORBIS_ALWAYS_INLINE float write_found(const leaf_hierarchy& tree, const knn_kernels& kernels, nearest_search& search,
@@ -149,6 +167,7 @@ ORBIS_ALWAYS_INLINE float write_found(const leaf_hierarchy& tree, const knn_kern
   const std::size_t wanted = row.size() + 1;  // including the point itself
   const std::uint32_t self = tree.members[l * leaf_width + i];
   if (const std::uint32_t* const places = search.found_places(i)) {
+    if (row.size() == 1) return write_nearest(found, places, tree.members.data(), self, row.front());
     gathered.assign(found, places, tree.members.data());
     return write_row(gathered, self, row);
   }
