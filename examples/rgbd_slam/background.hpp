@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Work in the background.
+/// A background thread for one piece of work at a time: starting a thread for each piece would take longer.
 #pragma once
 
 #include <cassert>

@@ -26,7 +26,6 @@ class keyframe_depths {
       : store_{std::move(options)}, background_{in_background} {}
   keyframe_depths(const keyframe_depths&) = delete;
   keyframe_depths& operator=(const keyframe_depths&) = delete;
-  ~keyframe_depths() { wait(); }
 
   /// Copies the image. First waits until the previous image is compressed, and rethrows any exception thrown by its
   /// compression. Call it from one thread only.
@@ -36,7 +35,7 @@ class keyframe_depths {
     if (background_)
       ahead = thread_
                   .start([this, frame, copy = depth] {
-                    if (!std::exchange(has_priority_, true)) lower_priority(live_map_niceness);
+                    if (!std::exchange(is_lowered_, true)) lower_priority(live_map_niceness);
                     keep(frame, copy);
                   })
                   .share();
@@ -101,7 +100,7 @@ class keyframe_depths {
   bool background_;
   mutable std::mutex ahead_mutex_;
   std::shared_future<void> ahead_;  // compression of the last image
-  bool has_priority_ = false;       // true if the thread has its priority
+  bool is_lowered_ = false;         // true once the thread has lowered its priority; used by that thread only
   background_thread thread_;        // uses the other members
 };
 

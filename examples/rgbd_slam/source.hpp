@@ -89,7 +89,7 @@ class read_ahead {
   bool background_;
   std::size_t at_ = 0;
   std::future<orbis::result<source_frame>> ahead_;
-  background_thread thread_;
+  background_thread thread_;  // uses the other members
 };
 
 }  // namespace app
