@@ -153,7 +153,7 @@ orbis::result<void> write_navigation_picture(const navigation_picture& what, con
     const double largest = largest_distance(what);
     std::snprintf(text, sizeof text, "clearance at a height of %.2f m, 0 to %.2f m", what.height, largest);
     panel(x, text, draw_slice(what, w, width, height), what.floor == nullptr || !what.drives,
-          {{at_obstacle, "next to obstacles, floor or unknown space"}, {far_off, "far from them"}});
+          {{at_obstacle, "next to obstacles, floor or unknown space"}, {far_off, "far from all"}});
   }
   return s.write(path);
 }

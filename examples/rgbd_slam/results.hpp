@@ -75,7 +75,7 @@ struct accuracy {
 /// The world frame of trajectory, clouds and maps. Its z axis points up.
 struct world_results {
   std::string up_from;               ///< "gravity", "floor", "walls", "assumed", "ground truth" or "loaded map"
-  std::optional<double> confidence;  ///< confidence of the estimate from the first depth image, 0 ... 1
+  std::optional<double> confidence;  ///< share of the first depth image's blocks that determine it, 0 ... 1
 };
 
 /// The camera's shutter.

@@ -613,6 +613,9 @@ result<frame_source> open_source(const settings& s, console& console) {
       return result<frame_source>{fail(orbis::errc::invalid_argument, s.topics.empty() ? "--truth-topic" : "--topics",
                                        "needs a ROS bag, but " + s.input.string() + " is not a bag")};
     if (bag || std::filesystem::is_regular_file(s.input, ignored)) return open_file(s);
+    if (is_result_folder(s.input) && s.sensor == "auto" && s.format == "auto")
+      return result<frame_source>{
+          fail(orbis::errc::unsupported, s.input.string(), "contains the results of a run, not a recording")};
     switch (choose_sensor(s)) {
       case sensor_kind::stereo: return open_stereo_recording(s);
       case sensor_kind::monocular: return open_mono_recording(s);
@@ -620,8 +623,6 @@ result<frame_source> open_source(const settings& s, console& console) {
     }
   };
   auto source = s.what == command::demo ? result<frame_source>{make_synthetic(s)} : open();
-  if (!source && is_result_folder(s.input))
-    return fail(orbis::errc::unsupported, s.input.string(), "contains the results of a run, not a recording");
   if (!source) return source;
   if (auto fits = check_images(*source, s); !fits) return fail(fits.error());
   if (source->is_stereo()) {

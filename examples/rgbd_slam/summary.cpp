@@ -201,7 +201,7 @@ std::string world_text(const world_results& w) {
   if (w.up_from == "gravity") return "z up, from --gravity";
   if (w.up_from == "assumed") return "z up, assuming a level camera at the first frame";
   return "z up, from the " + w.up_from + " in the first depth image" +
-         (w.confidence ? text(" (%.0f %% of it)", 100.0 * *w.confidence) : "");
+         (w.confidence ? text(" (%.0f %% of its blocks)", 100.0 * *w.confidence) : "");
 }
 
 std::string removed_text(const map_results& m) {
