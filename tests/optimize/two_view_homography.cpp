@@ -190,3 +190,21 @@ TEST_CASE("The homography says why there is none") {
   CHECK(why({vec2(0, 0)}, {vec2(0, 0)}).code == errc::no_data);
   CHECK(why({vec2(0, 0)}, m.second).code == errc::invalid_argument);
 }
+
+TEST_CASE("Matches on the other side of the horizon are no inliers") {
+  matches m;
+  m.homography << 1.0, 0.1, 5.0, 0.0, 1.0, 8.0, 0.0, -0.004, 1.0;  // the horizon is at y = 250
+  std::vector<std::uint32_t> expected;
+  for (int y = 10; y < 480; y += 30)
+    for (int x = 10; x < 640; x += 60) {
+      const vec2 p(x, y);
+      if (y < 250) expected.push_back(static_cast<std::uint32_t>(m.first.size()));
+      m.first.push_back(p);
+      m.second.push_back((m.homography * p.homogeneous()).hnormalized());
+    }
+  const auto found = optimize::estimate_homography(m.first, m.second, {.threshold = 0.5, .seed = 1});
+  REQUIRE(found.has_value());
+  const bool is_above = found->inliers == expected;
+  CHECK((is_above || found->inliers.size() == m.first.size() - expected.size()));
+  CHECK((found->H_second_first - m.homography).norm() < 1e-6 * m.homography.norm());
+}

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The RANSAC estimator of homographies between the rays of two cameras of any model, with errors in pixels.
+/// The RANSAC estimator of homographies between the rays of two cameras of any model, with errors in the unit of their
+/// metric: usually pixels.
 #pragma once
 
 #include <algorithm>
@@ -100,7 +101,7 @@ struct homography_equations {
   return u * u + v * v;
 }
 
-/// Estimates a homography from matches of rays. For matches of pixels, the rays are the pixels themselves, with the
+/// Estimates a homography from matches of rays. For matches of pixels, the rays are centred and scaled pixels, with the
 /// identity as their metric.
 class homography_estimator {
  public:
