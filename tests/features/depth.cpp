@@ -128,3 +128,26 @@ TEST_CASE("the deviation says how far the depth is off, under the sensor's noise
   CHECK(ratio < 1.0);
   CHECK(ratio > 0.2);
 }
+
+TEST_CASE("positions halfway between pixels are rounded away from zero") {
+  image<float> depth(9, 9);
+  for (int y = 0; y != 9; ++y)
+    for (int x = 0; x != 9; ++x) depth(x, y) = 1.0F + 0.001F * static_cast<float>(x);
+  const camera::depth_view<float> view{depth.view()};
+  const auto pixel = [&](float x) { return depth_at(view, x, 4.0F, {.radius = 0, .min_valid = 1}).value().z; };
+  CHECK(pixel(0.49999997F) == Approx(1.0));
+  CHECK(pixel(-0.49999997F) == Approx(1.0));
+  CHECK(pixel(0.5F) == Approx(1.001));
+  CHECK(pixel(3.4999998F) == Approx(1.003));
+  CHECK(pixel(3.5F) == Approx(1.004));
+}
+
+TEST_CASE("a few depths without an edge give their median") {
+  image<float> depth(5, 5);
+  depth(1, 1) = 1.004F;
+  depth(3, 2) = 1.0F;
+  depth(2, 3) = 1.001F;
+  const auto d = depth_at(camera::depth_view<float>{depth.view()}, 2.0F, 2.0F);
+  REQUIRE(d);
+  CHECK(d->z == Approx(1.001));
+}

@@ -93,6 +93,7 @@ template <camera::depth_source Depth>
   if (!(x > -0.5F && y > -0.5F && x < static_cast<float>(depth.width()) - 0.5F &&
         y < static_cast<float>(depth.height()) - 0.5F))
     return std::nullopt;
+  // Rounds like lround, because x > -0.5; a sum in float would not be exact.
   const int cx = static_cast<int>(static_cast<double>(x) + 0.5), cy = static_cast<int>(static_cast<double>(y) + 0.5);
 
   struct valid_pixel {
@@ -123,7 +124,7 @@ template <camera::depth_source Depth>
            gap > static_cast<double>(options.edge_relative) * static_cast<double>(near);
   };
   std::size_t begin = 0, end = count;
-  const bool is_even = !is_edge(least, greatest);  // if so, there is no edge between two of the depths, either
+  const bool is_even = !is_edge(least, greatest);  // then no two depths have an edge: noise grows with depth
   if (!is_even) {
     // Finds the largest run of sorted depths without a gap; even a steep slope has no gaps.
     sort();

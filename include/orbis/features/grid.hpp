@@ -101,7 +101,7 @@ class keypoint_grid {
   [[nodiscard]] int row_at(float y) const noexcept { return index_at(y, top_, rows_); }
   [[nodiscard]] int index_at(float at, float origin, int count) const noexcept {
     const double cell = (static_cast<double>(at) - static_cast<double>(origin)) * inverse_cell_;
-    return static_cast<int>(std::clamp(cell, 0.0, static_cast<double>(count - 1)));
+    return static_cast<int>(std::clamp(cell, 0.0, static_cast<double>(count - 1)));  // not negative: equal to floor
   }
   [[nodiscard]] std::size_t cell_of(const keypoint& k) const noexcept {
     return static_cast<std::size_t>(row_at(k.y)) * static_cast<std::size_t>(columns_) +
