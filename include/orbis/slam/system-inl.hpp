@@ -67,8 +67,11 @@ track_result ORBIS_SLAM_SYSTEM::track(double timestamp, image_view<const rgb8> c
   };
   if (options_.estimates_shutter) {
     // The image is read again when the next frame has been tracked.
-    read = [this, kept = read_later_[front_end_->counters().frames % 2].keep(depth)](
-               std::span<keypoint_as_read> seen, const frame_motion& m) { follow_rows(shared_.rig, m, seen, kept); };
+    detail::depth_copy& copy = read_later_[front_end_->counters().frames % 2];
+    copy.assign(depth);
+    read = [this, &copy](std::span<keypoint_as_read> seen, const frame_motion& m) {  // small enough not to allocate
+      copy.visit([&](const auto& kept) { follow_rows(shared_.rig, m, seen, kept); });
+    };
   }
   return track_frame(timestamp, std::move(f), read, clock);
 }

@@ -2,7 +2,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstring>
 
+#include <orbis/core/simd/level.hpp>
 #include <orbis/slam/detail/depth/surface.hpp>
 
 #include "slam/detail/depth/planes.hpp"
@@ -74,4 +76,25 @@ TEST_CASE("A surface has no cells where depth is missing or jumps or is out of r
   for (int v = 0; v != 240; ++v)
     for (int u = 0; u != 320; ++u) depth(u, v) = 11.0F;
   CHECK(count(surface_of(depth)) == 0);
+}
+
+TEST_CASE("The cells are the same with every instruction set, also in the last columns") {
+  const camera::pinhole camera{{332, 246, 262.5, 262.5, 165.5, 122.5}};  // 83 columns, no multiple of 8
+  const se3 pose(so3::exp(vec3(0.1, -0.2, 0.05)), vec3(0.1, 0.0, -0.2));
+  image<float> depth = test::depth_of(test::corner(), pose, camera);
+  for (int v = 0; v != depth.height(); ++v)
+    for (int u = 0; u != depth.width(); ++u) depth(u, v) *= (u * 7 + v * 13) % 11 == 0 ? 0.0F : 1.0F;
+  surface expected;
+  for (const simd::level level : simd::available_levels()) {
+    const simd::level_limit limit(level);
+    slam::detail::surface_builder<camera::pinhole> builder;
+    surface s;
+    builder.build(camera, test::metres(depth), 1.0 / 400.0, 0.1, 10.0, s);
+    CHECK(s.columns == 83);
+    std::size_t last = 0;
+    for (int row = 0; row != s.rows; ++row) last += s.cells[static_cast<std::size_t>(row * 83 + 82)].is_there();
+    CHECK(last > 40);
+    if (expected.empty()) expected = s;
+    CHECK(std::memcmp(s.cells.data(), expected.cells.data(), s.cells.size() * sizeof(surface_cell)) == 0);
+  }
 }

@@ -57,17 +57,16 @@ struct surface {
 
 /// The mean depth of each cell of an image, with a border of empty cells.
 struct cell_depths {
-  static constexpr int border = 2;  ///< width of the border, cells; on the right, it is wider
+  static constexpr int border = 2;  ///< width of the border, cells; on the right, wider: rows are read in blocks of 8
   std::size_t stride = 0;           ///< number of cells in a row, including the border
   std::vector<float> x, y;          ///< ray through the mean pixel, at z = 1
   std::vector<float> inverse;       ///< inverse depth, 1/m; 0 if the cell has no depth
 
-  /// Sets the size of the image, in cells. All cells are empty if it changes.
+  /// Sets the size of the image, in cells. All cells are empty.
   void resize(int columns, int rows) {
     constexpr std::size_t lanes = 8;
     stride = (static_cast<std::size_t>(columns) + lanes - 1) / lanes * lanes + 2 * border;
     const std::size_t cells = stride * (static_cast<std::size_t>(rows) + 2 * border);
-    if (inverse.size() == cells) return;
     for (auto* const v : {&x, &y, &inverse}) v->assign(cells, 0.0F);
   }
   [[nodiscard]] std::size_t index(int column, int row) const noexcept {
@@ -76,6 +75,7 @@ struct cell_depths {
 };
 
 /// Fits a plane to each cell of a row and the surrounding cells on the same surface.
+/// @pre the row is inside the size of `of`, which has `columns` columns, as many as `to` has cells
 struct fit_row_kernel {
   using signature = void(const cell_depths&, int row, int columns, float noise, surface_cell* to);
 
@@ -124,7 +124,7 @@ struct fit_row_kernel {
       const lanes z = select(fits, one / inverse, none);
       std::array<std::array<float, 8>, 7> out;
       std::size_t next = 0;
-      for (const lanes& v : {mx * z, my * z, z, none - a / length, none - b / length, none - c / length, one / mw})
+      for (const lanes& v : {mx * z, my * z, z, -(a / length), -(b / length), -(c / length), one / mw})
         v.store(out[next++].data());
       const auto last = static_cast<std::size_t>(std::min(8, columns - column));
       for (std::size_t i = 0; i != last; ++i)
@@ -148,8 +148,10 @@ class surface_builder {
     to.columns = depth.width() / to.step;
     to.rows = depth.height() / to.step;
     const auto cells = static_cast<std::size_t>(to.columns) * static_cast<std::size_t>(to.rows);
-    if (rays_.size() != cells) find_rays(camera, to);
-    depths_.resize(to.columns, to.rows);
+    if (rays_.size() != cells) {
+      find_rays(camera, to);
+      depths_.resize(to.columns, to.rows);
+    }
     to.cells.resize(cells);
     const sampling how{to.step, static_cast<float>(min_depth), static_cast<float>(max_depth),
                        static_cast<float>(4.0 * noise)};

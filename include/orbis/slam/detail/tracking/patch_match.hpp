@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -231,7 +232,7 @@ struct match_patch_kernel {
         const lanes u = max(lanes(0.0F), min(right, lanes(static_cast<float>(begin.x())) + step_x));
         const lanes v = max(lanes(0.0F), min(bottom, lanes(static_cast<float>(begin.y())) + step_y));
         const integers left = simd::convert<std::int32_t>(u), top = simd::convert<std::int32_t>(v);
-        // Two neighbouring pixels of a row are read at once.
+        // Reading two neighbouring pixels of a row at once halves the number of loads, which take half of the time.
         std::array<std::int32_t, 8> columns, rows;
         std::array<std::uint16_t, 8> upper_pairs, lower_pairs;
         left.store(columns.data()), top.store(rows.data());
@@ -241,9 +242,11 @@ struct match_patch_kernel {
           std::memcpy(&lower_pairs[k], at + image.stride(), 2);
         }
         const lanes fx = u - simd::convert<float>(left), fy = v - simd::convert<float>(top);
+        constexpr int first_bit = std::endian::native == std::endian::little ? 0 : 8;  // of the left pixel
         const auto between = [&](const std::array<std::uint16_t, 8>& pairs) ORBIS_INLINE_LAMBDA {
           const integers both = simd::convert<std::int32_t>(simd::vec<std::uint16_t, 8, Target>::load(pairs.data()));
-          const lanes first = simd::convert<float>(both & integers(255)), second = simd::convert<float>(both >> 8);
+          const lanes first = simd::convert<float>((both >> first_bit) & integers(255));
+          const lanes second = simd::convert<float>((both >> (8 - first_bit)) & integers(255));
           return first + fx * (second - first);
         };
         const lanes upper = between(upper_pairs), lower = between(lower_pairs);
