@@ -25,7 +25,6 @@
 
 #include "support/catch.hpp"
 #include "viewer/backend.hpp"
-#include "viewer/call_thread.hpp"
 #include "viewer/scene_builder.hpp"
 #include "viewer/viewer_thread.hpp"
 #include "viewer/web_messages.hpp"
@@ -456,17 +455,6 @@ int niceness() { return ::getpriority(PRIO_PROCESS, static_cast<id_t>(::syscall(
 #endif
 
 }  // namespace
-
-TEST_CASE("A call aside runs on another thread, and brings back what it throws") {
-  call_thread aside;
-  std::thread::id where;
-  aside.call([&] { where = std::this_thread::get_id(); });
-  CHECK(where != std::this_thread::get_id());
-  CHECK_THROWS_WITH(aside.call([] { throw std::runtime_error{"no"}; }), "no");
-  int calls = 0;
-  for (int i = 0; i != 100; ++i) aside.call([&] { ++calls; });
-  CHECK(calls == 100);
-}
 
 TEST_CASE("The viewer draws what it is shown and what its sources say, until it is closed") {
   viewer_thread viewer{"a run", 3, rays(), 0.05};

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <system_error>
 
 #include "priority.hpp"
 
@@ -25,7 +26,10 @@ viewer_thread::~viewer_thread() {
 
 orbis::result<std::string> viewer_thread::start(open_backend open) {
   try {
-    aside_ = std::make_unique<call_thread>();
+    aside_ = std::make_unique<background_thread>();
+    const auto begun = aside_->start([] {});  // a thread has the priority of its creator
+    if (!begun.valid()) throw std::system_error{std::make_error_code(std::errc::resource_unavailable_try_again)};
+    begun.wait();
     std::promise<orbis::result<std::string>> opened;
     auto outcome = opened.get_future();
     thread_ = std::thread{[this, open = std::move(open), opened = std::move(opened)]() mutable { run(open, opened); }};
@@ -94,13 +98,13 @@ void viewer_thread::connect(scene_sources sources) {
   if (sources.graph)
     sources.graph = [this, ask = std::move(sources.graph)](slam_graph& graph, bool always) {
       bool is_new = false;
-      aside_->call([&] { is_new = ask(graph, always); });
+      aside_->start([&] { is_new = ask(graph, always); }).get();
       return is_new;
     };
   if (sources.numbers)
     sources.numbers = [this, ask = std::move(sources.numbers)] {
       live_results results;
-      aside_->call([&] { results = ask(); });
+      aside_->start([&] { results = ask(); }).get();
       return results;
     };
   const std::lock_guard lock{mutex_};

@@ -20,8 +20,8 @@
 #include <orbis/camera/rays.hpp>
 #include <orbis/core/result.hpp>
 
+#include "background.hpp"
 #include "viewer/backend.hpp"
-#include "viewer/call_thread.hpp"
 #include "viewer/scene_builder.hpp"
 
 namespace app {
@@ -80,7 +80,9 @@ class viewer_thread {
   std::mutex mutex_;
   std::condition_variable changed_;
   scene_sources sources_;
-  std::unique_ptr<call_thread> aside_;
+  /// Makes the calls that lock mutexes of high-priority threads, with the priority of the thread that created it: on a
+  /// machine with few cores, a low-priority thread may not be scheduled for a long time while it holds a lock.
+  std::unique_ptr<background_thread> aside_;
   std::thread thread_;
 };
 
