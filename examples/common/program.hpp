@@ -35,8 +35,9 @@ namespace examples {
   const bool is_extra = dynamic_cast<const CLI::ExtrasError*>(&e) != nullptr;
   if (is_extra || dynamic_cast<const CLI::RequiredError*>(&e) != nullptr) {
     const std::vector<std::string> rest = cli.remaining(true);
-    const auto option = std::ranges::find_if(
-        rest, [](const std::string& word) { return word.size() > 1 && word[0] == '-' && !std::isdigit(word[1]); });
+    const auto option = std::ranges::find_if(rest, [](const std::string& word) {
+      return word.size() > 1 && word[0] == '-' && !std::isdigit(static_cast<unsigned char>(word[1]));
+    });
     if (option != rest.end())
       what = "unknown option " + orbis::in_quotes(*option);
     else if (is_extra && !rest.empty())
