@@ -108,10 +108,9 @@ struct plane_motion {
 /// Estimates the homography that agrees with most matches: RANSAC with four points per sample; each new best homography
 /// is refined on its inliers (least squares of the transfer errors in both images). `first[i]` matches `second[i]`, in
 /// undistorted pixels. Matches that are not finite, or on the other side of the horizon than most (behind the camera),
-/// are outliers. Deterministic for a given `options.seed`. Errors:
-/// `invalid_argument` for spans of different lengths or options out of range; `no_data` for fewer than four matches;
-/// `degenerate` if fewer than four are finite, all points of an image are collinear, or no homography has `min_inliers`
-/// inliers. The message gives the reason.
+/// are outliers. Deterministic for a given `options.seed`. Errors: `invalid_argument` for spans of different lengths or
+/// options out of range; `no_data` for fewer than four matches; `degenerate` if fewer than four are finite, all points
+/// of an image are collinear, or no homography has `min_inliers` inliers. The message gives the reason.
 template <std::same_as<homography_options> Options = homography_options>
 [[nodiscard]] result<homography_estimate> estimate_homography(std::span<const vec2> first, std::span<const vec2> second,
                                                               const Options& options = {});
