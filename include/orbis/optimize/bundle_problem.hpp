@@ -3,6 +3,7 @@
 /// The parts of a bundle adjustment problem: observations, the concept of a residual, options and summary.
 #pragma once
 
+#include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
@@ -25,6 +26,7 @@ struct bundle_observation {
   double information = 1.0;                                 ///< 1 / sigma^2 of the pixel, in 1 / pixel^2
   double depth_weight = 1.0;                                ///< see `pose_observation`
   vec2 smear = zeros<vec2>();                               ///< see `pose_observation`; for `reprojection` only
+  [[nodiscard]] bool has_depth() const noexcept { return !std::isnan(right); }
 };
 
 /// Manifold of a camera state: the type of the state and the effect of a step. `m.retract(p, d)` is the state to

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cmath>
+#include <concepts>
 #include <limits>
 #include <optional>
 
@@ -31,6 +32,17 @@ struct pose_observation {
   /// s^T) / information`, and that of the depth is unchanged.
   vec2 smear = zeros<vec2>();
   [[nodiscard]] bool has_depth() const noexcept { return !std::isnan(right); }
+};
+
+/// The part of an observation from which `reprojection` computes its residual, as in a `pose_observation` or a
+/// `bundle_observation`.
+template <class O>
+concept observed_pixel = requires(const O& o) {
+  { o.pixel } -> std::convertible_to<vec2>;
+  { o.right } -> std::convertible_to<double>;
+  { o.has_depth() } -> std::same_as<bool>;
+  { o.depth_weight } -> std::convertible_to<double>;
+  { o.smear } -> std::convertible_to<vec2>;
 };
 
 namespace detail {
@@ -85,15 +97,17 @@ struct reprojection {
 
   /// Returns the residual for a point in the camera frame; empty if it has no projection. Without depth, the third
   /// entry is 0.
-  [[nodiscard]] std::optional<vec3> residual(const vec3& point_camera, const pose_observation& o) const {
+  template <observed_pixel Observation = pose_observation>
+  [[nodiscard]] std::optional<vec3> residual(const vec3& point_camera, const Observation& o) const {
     const auto pixel = camera.project(point_camera);
     if (!pixel) return std::nullopt;
-    return difference(*pixel, point_camera.z(), o);
+    return difference(*pixel, point_camera.z(), o, detail::whitening(o.smear));
   }
 
   /// Like the overload without `j`; also writes the derivative with respect to the point in the camera frame to `j`.
   /// Without depth, its third row is 0.
-  [[nodiscard]] std::optional<vec3> residual(const vec3& point_camera, const pose_observation& o, mat3& j) const {
+  template <observed_pixel Observation = pose_observation>
+  [[nodiscard]] std::optional<vec3> residual(const vec3& point_camera, const Observation& o, mat3& j) const {
     matrix<2, 3> projection;
     const auto pixel = camera.project(point_camera, projection);
     if (!pixel) return std::nullopt;
@@ -105,7 +119,7 @@ struct reprojection {
       for (int i = 0; i != 3; ++i) j(2, i) = o.depth_weight * projection(0, i);
       j(2, 2) += o.depth_weight * bf / (point_camera.z() * point_camera.z());
     }
-    return difference(*pixel, point_camera.z(), o);
+    return difference(*pixel, point_camera.z(), o, w);
   }
 
   // The interface of `bundle_residual` and `camera_frame_residual`.
@@ -125,11 +139,11 @@ struct reprojection {
     return detail::linearize_through_camera(*this, v, point, o, by_camera, by_point);
   }
   [[nodiscard]] std::optional<vec3> residual_in_camera(const view&, const vec3& q, const observation& o) const {
-    return residual(q, as_pose_observation(o));
+    return residual(q, o);
   }
   [[nodiscard]] std::optional<vec3> linearize_in_camera(const view&, const vec3& q, const observation& o, mat3& by_q,
                                                         matrix<3, 0>&) const {
-    return residual(q, as_pose_observation(o), by_q);
+    return residual(q, o, by_q);
   }
 
   // Evaluation of eight observations at a time; see detail/bundle/lane_residual.hpp.
@@ -137,8 +151,8 @@ struct reprojection {
   static void measure(const observation& o, double* to) {
     to[0] = o.pixel.x();
     to[8] = o.pixel.y();
-    to[16] = std::isnan(o.right) ? 0.0 : o.right;
-    to[24] = std::isnan(o.right) ? 0.0 : o.depth_weight;
+    to[16] = o.has_depth() ? o.right : 0.0;
+    to[24] = o.has_depth() ? o.depth_weight : 0.0;
     const vec2 w = detail::whitening(o.smear);
     to[32] = w.x();
     to[40] = w.y();
@@ -147,11 +161,10 @@ struct reprojection {
   auto lanes_in_camera(const view&, const double* measurements, const L* q, L* r, L (*by_q)[3], L (*)[1]) const;
 
  private:
-  [[nodiscard]] static pose_observation as_pose_observation(const observation& o) {
-    return {zeros<vec3>(), o.pixel, o.right, o.information, o.depth_weight, o.smear};
-  }
-  [[nodiscard]] vec3 difference(const vec2& pixel, double z, const pose_observation& o) const {
-    const vec2 w = detail::whitening(o.smear), error = pixel - o.pixel;
+  /// `w`: `detail::whitening` of the smear.
+  template <observed_pixel Observation>
+  [[nodiscard]] vec3 difference(const vec2& pixel, double z, const Observation& o, const vec2& w) const {
+    const vec2 error = pixel - o.pixel;
     const double along = dot(w, error);
     return {error.x() - along * w.x(), error.y() - along * w.y(),
             o.has_depth() ? o.depth_weight * (right(pixel.x(), z) - o.right - along * w.x()) : 0.0};

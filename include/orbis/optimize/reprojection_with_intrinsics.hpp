@@ -141,7 +141,7 @@ struct reprojection_with_intrinsics {
     matrix<2, parameters::count> by_parameters;
     const auto pixel = parameters::project(v.camera, q, by_point, by_parameters);
     if (!pixel) return std::nullopt;
-    const bool has_depth = !std::isnan(o.right);
+    const bool has_depth = o.has_depth();
     for (int i = 0; i != 3; ++i) {
       by_q(0, i) = by_point(0, i);
       by_q(1, i) = by_point(1, i);
@@ -159,8 +159,7 @@ struct reprojection_with_intrinsics {
 
  private:
   [[nodiscard]] vec3 difference(const vec2& pixel, double z, const observation& o) const {
-    return {pixel.x() - o.pixel.x(), pixel.y() - o.pixel.y(),
-            std::isnan(o.right) ? 0.0 : right(pixel.x(), z) - o.right};
+    return {pixel.x() - o.pixel.x(), pixel.y() - o.pixel.y(), o.has_depth() ? right(pixel.x(), z) - o.right : 0.0};
   }
 };
 

@@ -79,7 +79,7 @@ class shared_intrinsics {
   /// Returns true if depth observations determine the scale.
   [[nodiscard]] bool has_depth() const {
     for (std::size_t k = 0; k != observations_.size(); ++k)
-      if (out_[k] == out::no && !std::isnan(observations_[k].right)) return true;
+      if (out_[k] == out::no && observations_[k].has_depth()) return true;
     return false;
   }
   [[nodiscard]] const Camera& camera() const noexcept { return now_.camera; }
@@ -119,7 +119,7 @@ class shared_intrinsics {
     set_noise();
     const std::vector<view_type> views = make_views(now_);
     for (std::size_t k = 0; k != observations_.size(); ++k) {
-      const double gate = gates[std::isnan(observations_[k].right) ? 0 : 1] * noise_ * noise_;
+      const double gate = gates[observations_[k].has_depth() ? 1 : 0] * noise_ * noise_;
       out_[k] = squared(views, now_.points, k) > gate ? out::outlier : out::no;
     }
     keep_connected();
@@ -136,7 +136,7 @@ class shared_intrinsics {
       const double s = out_[k] != out::no ? std::numeric_limits<double>::infinity() : squared(views, e.points, k);
       if (!std::isfinite(s)) continue;
       sum += s;
-      entries += std::isnan(observations_[k].right) ? 2.0 : 3.0;
+      entries += observations_[k].has_depth() ? 3.0 : 2.0;
     }
     return entries > 0.0 ? std::sqrt(sum / entries) : 0.0;
   }
@@ -198,7 +198,7 @@ class shared_intrinsics {
     std::vector<double> shares;
     for (std::size_t k = 0; k != observations_.size(); ++k)
       if (out_[k] == out::no) {
-        const double s = squared(views, now_.points, k) / medians[std::isnan(observations_[k].right) ? 0 : 1];
+        const double s = squared(views, now_.points, k) / medians[observations_[k].has_depth() ? 1 : 0];
         if (std::isfinite(s)) shares.push_back(s);
       }
     if (shares.empty()) return;
@@ -297,7 +297,7 @@ class shared_intrinsics {
                                std::size_t k) const {
     const bundle_observation& o = observations_[k];
     auto r = residual_.residual(views[o.pose], points[o.point], o);
-    if (r && !std::isnan(o.right))
+    if (r && o.has_depth())
       (*r)[2] = o.depth_weight * ((*r)[2] - (*r)[0]);  // only the depth error: the difference of inverse depths
     return r ? o.information * squared_norm(*r) : std::numeric_limits<double>::infinity();
   }
@@ -350,7 +350,7 @@ class shared_intrinsics {
       matrix<3, parameters::count> by_all;
       auto r = residual_.linearize_in_camera(view, q, o, by_q, by_all);
       if (!r) continue;
-      if (!std::isnan(o.right)) {
+      if (o.has_depth()) {
         const double w = o.depth_weight;
         (*r)[2] = w * ((*r)[2] - (*r)[0]);
         for (int i = 0; i != 3; ++i) by_q(2, i) = w * (by_q(2, i) - by_q(0, i));

@@ -5,7 +5,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -169,7 +168,7 @@ class bundle_solver {
     squared_.resize(s.observations.size());
     adjuster_.chi2(to.poses, to.points, s.observations, squared_);
     for (std::size_t i = 0; i != s.observations.size(); ++i)
-      to.outliers[i] = squared_[i] > error_limit(!std::isnan(s.observations[i].right)) ? 1 : 0;
+      to.outliers[i] = squared_[i] > error_limit(s.observations[i].has_depth()) ? 1 : 0;
   }
 
   /// Unmarks patch observations that agree with the current poses and points if their standard deviation is assumed to
@@ -178,11 +177,10 @@ class bundle_solver {
     for (std::size_t i = 0; i != s.observations.size(); ++i) {
       const optimize::bundle_observation& o = s.observations[i];
       if (to.outliers[i] == 0 || o.depth_weight == 1.0) continue;
-      optimize::pose_observation rough;
-      rough.pixel = o.pixel;
-      rough.right = o.right;
-      rough.information = o.information * o.depth_weight * o.depth_weight;
-      rough.smear = o.depth_weight * o.smear;
+      optimize::bundle_observation rough = o;
+      rough.information *= o.depth_weight * o.depth_weight;
+      rough.smear *= o.depth_weight;
+      rough.depth_weight = 1.0;
       const auto error = model_.residual(to.poses[o.pose].inverse() * to.points[o.point], rough);
       if (error && squared_norm(*error) * rough.information <= error_limit(rough.has_depth())) to.outliers[i] = 0;
     }
