@@ -223,7 +223,7 @@ exit_code evaluate(const settings& s, console& console) {
     warnings.push_back("only " + std::to_string(compared->poses.size()) + " poses have a reference pose; " + units);
   for (const std::string& warning : warnings) console.warn(warning);
   if (!compared) {
-    orbis::error e{compared.error().code, s.input.string(), compared.error().message};
+    orbis::error e{compared.error().code, s.input.string() + " and " + s.reference.string(), compared.error().message};
     if (e.code == orbis::errc::no_data)
       e.message += "; the times are " + orbis::io::describe_spans(estimate->poses, truth->poses);
     return give_up(e);
