@@ -308,8 +308,13 @@ bool is_text(const std::filesystem::path& path) {
   });
 }
 
+bool is_image(const std::filesystem::path& file) {
+  const auto ending = file.extension();
+  return ending == ".png" || ending == ".jpg" || ending == ".jpeg";
+}
+
 result<frame_source> open_file(const settings& s) {
-  if (const auto ending = s.input.extension(); ending == ".png" || ending == ".jpg" || ending == ".jpeg")
+  if (is_image(s.input))
     return fail(orbis::errc::unsupported, s.input.string(),
                 "is a single image; specify its folder, " + std::filesystem::absolute(s.input).parent_path().string());
   if (!is_bag(s.input) && is_text(s.input))
@@ -378,11 +383,25 @@ result<std::unique_ptr<camera_device>> open_device(const settings& s) {
   return open_openni(options);
 }
 
+/// Returns true if most images in a folder have numbers in their names, as frames have and the pictures of a run do
+/// not.
+bool has_numbered_images(const std::filesystem::path& folder) {
+  std::error_code ignored;
+  std::size_t numbered = 0, others = 0;
+  for (const auto& entry : std::filesystem::directory_iterator{folder, ignored}) {
+    if (!is_image(entry.path())) continue;
+    const std::string name = entry.path().stem().string();
+    ++(name.find_first_of("0123456789") == std::string::npos ? others : numbered);
+  }
+  return numbered > others;
+}
+
 /// Returns true if a folder contains the results of a run and no recording.
 bool is_result_folder(const std::filesystem::path& folder) {
   std::error_code ignored;
   return std::filesystem::exists(folder / "trajectory.txt", ignored) &&
-         std::filesystem::exists(folder / "camera_used.toml", ignored) && !is_recording(folder);
+         std::filesystem::exists(folder / "camera_used.toml", ignored) && !is_recording(folder) &&
+         !has_numbered_images(folder);
 }
 
 /// A camera that starts at the first request for a frame.
