@@ -25,6 +25,7 @@
 #include "commands.hpp"
 #include "corrected_frame.hpp"
 #include "filters.hpp"
+#include "formatted_text.hpp"
 #include "map_stage.hpp"
 #include "navigation.hpp"
 #include "output.hpp"
@@ -85,7 +86,9 @@ orbis::result<posed_frames> frames_with_poses(const frame_source& source, const 
     console.advance(i + 1, source.frames);
   }
   if (posed.size() == 0)
-    return orbis::fail(orbis::errc::no_data, s.input.string(), "no frame has a pose in the ground truth");
+    return orbis::fail(orbis::errc::no_data, s.input.string(),
+                       source.ground_truth.empty() ? "has no ground truth, and map needs poses; run estimates them"
+                                                   : "no frame has a pose in the ground truth");
   console.finish(std::to_string(posed.size()) + " of " + std::to_string(source.frames) + " frames have a pose");
   return posed;
 }
@@ -221,6 +224,14 @@ exit_code evaluate(const settings& s, console& console) {
   const std::string units = orbis::io::describe_units(estimate->poses, truth->poses);
   if (compared && !units.empty())
     warnings.push_back("only " + std::to_string(compared->poses.size()) + " poses have a reference pose; " + units);
+  if (compared && !s.with_scale) {
+    constexpr double clear = 1.1;  // ratio of lengths that a trajectory with depth does not have
+    const auto scaled = compare(estimate->poses, truth->poses, true);
+    if (scaled && (scaled->scale > clear || scaled->scale < 1.0 / clear) &&
+        2.0 * scaled->ate_rmse_m < compared->ate_rmse_m)
+      warnings.push_back(text("%s: scaled by %.4g, its ATE would be %.4f m; use --scale if its unit is arbitrary",
+                              s.input.string().c_str(), scaled->scale, scaled->ate_rmse_m));
+  }
   for (const std::string& warning : warnings) console.warn(warning);
   if (!compared) {
     orbis::error e{compared.error().code, s.input.string() + " and " + s.reference.string(), compared.error().message};
@@ -228,9 +239,9 @@ exit_code evaluate(const settings& s, console& console) {
       e.message += "; the times are " + orbis::io::describe_spans(estimate->poses, truth->poses);
     return give_up(e);
   }
-  std::string text = s.json ? accuracy_json(*compared, warnings) : accuracy_lines(*compared) + "\n";
-  text.pop_back();
-  if (!console.print(text)) return give_up({orbis::errc::write_failed, "standard output", "cannot be written"});
+  std::string lines = s.json ? accuracy_json(*compared, warnings) : accuracy_lines(*compared) + "\n";
+  lines.pop_back();
+  if (!console.print(lines)) return give_up({orbis::errc::write_failed, "standard output", "cannot be written"});
   return done;
 }
 

@@ -159,6 +159,7 @@ std::string summary_json(const results& r) {
 
 std::string accuracy_json(const accuracy& a, const std::vector<std::string>& warnings) {
   const json j = {{"pairs", a.poses.size()},
+                  {"scale", a.scale},
                   {"ate_rmse_m", a.ate_rmse_m},
                   {"ate_mean_m", a.ate_mean_m},
                   {"ate_median_m", a.ate_median_m},

@@ -46,8 +46,13 @@ file(WRITE ${WORK}/eval/small.txt "${small}")
 file(WRITE ${WORK}/eval/large.txt "${large}")
 app(0 eval eval/small.txt eval/large.txt --scale)
 check(out MATCHES "ATE  RMSE 0.0000 m.*after scaling by 2")
+check(NOT err MATCHES "--scale")
+app(0 eval eval/small.txt eval/large.txt --scale --json)
+string(JSON scale GET "${out}" scale)
+check(scale GREATER 1.9999 AND scale LESS 2.0001)
 app(0 eval eval/small.txt eval/large.txt)
 check(out MATCHES "ATE  RMSE [1-9]")
+check(err MATCHES "small.txt: scaled by 2, its ATE would be 0.0000 m. use --scale")
 
 # A camera that sees nothing that could be followed: no start.
 app_fails(3 "tracking never started: no two of the 3 frames have enough matching features and parallax" demo --plain --sensor mono --frames 3 --out still)
