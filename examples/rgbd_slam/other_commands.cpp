@@ -14,6 +14,7 @@
 #include <orbis/cloud/extract.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/trajectory.hpp>
+#include <orbis/eval/ate.hpp>
 #include <orbis/eval/orientations.hpp>
 #include <orbis/io/cloud_fields.hpp>
 #include <orbis/io/trajectory_file.hpp>
@@ -226,11 +227,11 @@ exit_code evaluate(const settings& s, console& console) {
     warnings.push_back("only " + std::to_string(compared->poses.size()) + " poses have a reference pose; " + units);
   if (compared && !s.with_scale) {
     constexpr double clear = 1.1;  // ratio of lengths that a trajectory with depth does not have
-    const auto scaled = compare(estimate->poses, truth->poses, true);
-    if (scaled && (scaled->scale > clear || scaled->scale < 1.0 / clear) &&
-        2.0 * scaled->ate_rmse_m < compared->ate_rmse_m)
+    const auto scaled = orbis::eval::ate(estimate->poses, truth->poses, {.with_scale = true});
+    const double scale = scaled ? scaled->aligned.scale : 1.0;
+    if ((scale > clear || scale < 1.0 / clear) && 2.0 * scaled->translation.rmse < compared->ate_rmse_m)
       warnings.push_back(text("%s: scaled by %.4g, its ATE would be %.4f m; use --scale if its unit is arbitrary",
-                              s.input.string().c_str(), scaled->scale, scaled->ate_rmse_m));
+                              s.input.string().c_str(), scale, scaled->translation.rmse));
   }
   for (const std::string& warning : warnings) console.warn(warning);
   if (!compared) {
