@@ -37,7 +37,6 @@ struct own_camera {
 
   [[nodiscard]] int width() const { return inner.width(); }
   [[nodiscard]] int height() const { return inner.height(); }
-  [[nodiscard]] camera::intrinsics k() const { return inner.k(); }
   [[nodiscard]] std::optional<vec2> project(const vec3& p) const { return inner.project(p); }
   [[nodiscard]] std::optional<vec2> project(const vec3& p, matrix<2, 3>& jacobian) const {
     return inner.project(p, jacobian);

@@ -181,8 +181,13 @@ class surface_builder {
       for (int column = 0; column != to.columns; ++column) {
         const vec2 middle((column + 0.5) * to.step - 0.5, (row + 0.5) * to.step - 0.5);
         const auto r = camera.unproject(middle);
-        rays_.push_back({r ? static_cast<float>(r->x()) : none, r ? static_cast<float>(r->y()) : none,
-                         static_cast<float>(1.0 / camera.k().fx), static_cast<float>(1.0 / camera.k().fy)});
+        const auto left = camera.unproject(middle - vec2(0.5, 0.0)), right = camera.unproject(middle + vec2(0.5, 0.0));
+        const auto above = camera.unproject(middle - vec2(0.0, 0.5)), below = camera.unproject(middle + vec2(0.0, 0.5));
+        if (r && left && right && above && below)
+          rays_.push_back({static_cast<float>(r->x()), static_cast<float>(r->y()),
+                           static_cast<float>(right->x() - left->x()), static_cast<float>(below->y() - above->y())});
+        else
+          rays_.push_back({none, none, none, none});
       }
   }
 
