@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <sstream>
 #include <string>
 #include <tuple>
@@ -202,7 +203,12 @@ void add_shutter_option(CLI::App& cmd, settings& s) {
          },
          "read-out time of the rolling shutter in milliseconds, top row first; 0: global shutter; auto (default): from "
          "the camera file, or else estimated from the first ten seconds")
-      ->check(CLI::IsMember({"auto"}) | within(0.0, 200.0, " ms"))
+      ->check(CLI::Validator(
+          [check = within(0.0, 200.0, " ms")](std::string& text) {
+            const std::string why = text == "auto" ? std::string{} : check(text);
+            return why.empty() ? why : why + "; use a number or auto";
+          },
+          ""))
       ->type_name("MS");
 }
 

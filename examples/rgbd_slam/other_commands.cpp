@@ -144,6 +144,19 @@ orbis::result<void> check_resolution(const std::vector<orbis::vec3f>& points, co
   return {};
 }
 
+/// The first option in the settings that concerns recordings only; empty if there is none.
+std::string option_of_recordings(const settings& s) {
+  return s.sensor != "auto"       ? "--sensor"
+         : s.format != "auto"     ? "--format"
+         : !s.topics.empty()      ? "--topics"
+         : !s.truth_topic.empty() ? "--truth-topic"
+         : !s.camera.empty()      ? "--camera"
+         : s.frames != 0          ? "--frames"
+         : s.stride != 1          ? "--stride"
+         : s.gravity.has_value()  ? "--gravity"
+                                  : "";
+}
+
 orbis::result<mapped> map_cloud_file(const settings& s, const std::filesystem::path& folder, console& console) {
   if (filter_options(s).kind == orbis::mapping::filter_kind::ray_evidence)
     return orbis::fail(orbis::errc::invalid_argument, s.input.string(),
@@ -211,6 +224,12 @@ orbis::result<void> complete_times(const settings& s, orbis::io::trajectory_read
 
 exit_code evaluate(const settings& s, console& console) {
   const auto give_up = [&](const orbis::error& e) { return console.error(e), bad_input; };
+  for (const std::filesystem::path& path : {s.input, s.reference}) {
+    if (const auto folder = needs_file(path, "trajectory.txt")) return give_up(*folder);
+    std::error_code ignored;
+    if (std::filesystem::is_regular_file(path, ignored) && !std::filesystem::is_empty(path, ignored) && !is_text(path))
+      return give_up({orbis::errc::unsupported, path.string(), "is not a trajectory: trajectories are text files"});
+  }
   auto estimate = orbis::io::read_trajectory_file(s.input);
   if (!estimate) return give_up(estimate.error());
   auto truth = orbis::io::read_trajectory_file(s.reference);
@@ -256,6 +275,12 @@ exit_code map_without_slam(const settings& s, console& console) {
     if (source->is_monocular())
       return give_up({orbis::errc::unsupported, s.input.string(), "a monocular recording cannot produce a map"});
     recording = *std::move(source);
+  } else if (const std::string option = option_of_recordings(s); !option.empty()) {
+    return console.error(
+               {orbis::errc::invalid_argument, option, "needs a recording; " + s.input.string() + " is none"}),
+           bad_usage;
+  } else if (const auto ending = s.input.extension(); ending == ".bt" || ending == ".ot") {
+    return give_up({orbis::errc::unsupported, s.input.string(), "is an octree map already; plan finds paths in it"});
   }
   const auto inputs = input_files(s, recording ? recording->files : std::vector<std::filesystem::path>{});
   if (const auto conflict = find_overwritten(s, inputs)) return console.error(*conflict), bad_usage;

@@ -27,9 +27,12 @@
 namespace app {
 namespace {
 
-/// Checks the outputs before the run starts. Prints the error and returns the exit code if the run would overwrite a
-/// file that it must not replace, or if it cannot write its results.
-std::optional<exit_code> check_outputs(const frame_source& source, const settings& s, console& console) {
+/// Checks the files before the run starts. Prints the error and returns the exit code if the map to load is missing, or
+/// if the run would overwrite a file that it must not replace or cannot write its results.
+std::optional<exit_code> check_files(const frame_source& source, const settings& s, console& console) {
+  std::error_code ignored;
+  if (!s.load_map.empty() && !std::filesystem::exists(s.load_map, ignored))
+    return console.error({orbis::errc::not_found, s.load_map.string(), "no such file"}), bad_input;
   if (const auto conflict = find_overwritten(s, input_files(s, source.files)))
     return console.error(*conflict), bad_usage;
   if (const auto unwritable = find_unwritable(s)) return console.error(*unwritable), bad_input;
@@ -225,7 +228,7 @@ exit_code run_slam(const settings& s, console& console) {
 
   auto source = open_source(s, console);
   if (!source) return give_up(source.error());
-  if (const auto code = check_outputs(*source, s, console)) return *code;
+  if (const auto code = check_files(*source, s, console)) return *code;
 
   // Estimate the camera's shutter and, if necessary, its intrinsics.
   const shutter_results shutter = prepare_camera(*source, s, console);

@@ -45,6 +45,7 @@ using orbis::octree::occupancy;
 
 /// Reads a .bt or .ot map; the first bytes determine the format.
 orbis::result<octree> read_map(const std::filesystem::path& path) {
+  if (auto folder = needs_file(path, "map.bt")) return orbis::fail(*std::move(folder));
   const auto bytes = orbis::read_file(path);
   if (!bytes) return orbis::fail(bytes.error());
   const auto view = std::as_bytes(std::span{*bytes});
@@ -77,16 +78,15 @@ std::optional<orbis::error> find_conflict(const settings& s) {
   return find_overwritten({s.out, s.picture}, {s.input});
 }
 
-/// The box of the search: all known space with a margin.
-orbis::octree::bounding_box box_to_search(const octree& map, const settings& s) {
+/// The smallest box around all known space.
+orbis::octree::bounding_box known_space(const octree& map) {
   constexpr double inf = std::numeric_limits<double>::infinity();
   orbis::octree::bounding_box box{vec3::Constant(inf), vec3::Constant(-inf)};
   map.for_each_leaf([&](const octree::leaf& leaf) {
     box.min = box.min.cwiseMin((leaf.center.array() - 0.5 * leaf.size).matrix());
     box.max = box.max.cwiseMax((leaf.center.array() + 0.5 * leaf.size).matrix());
   });
-  const double margin = 1.0 + 2 * s.robot_radius;
-  return {(box.min.array() - margin).matrix(), (box.max.array() + margin).matrix()};
+  return box;
 }
 
 /// Returns true if the distance field may take more than `limit` bytes: the memory of all blocks, with an edge of
@@ -202,7 +202,8 @@ std::optional<vec3> nearest_free(const Space& space, const vec3& p) {
 
 /// The reason why there is no path, and the distance from the goal to the nearest reachable position.
 template <nav::planning_space Space, class Map>
-std::string explain(const nav::found_path& path, const Space& space, const Map& map, const settings& s) {
+std::string explain(const nav::found_path& path, const Space& space, const Map& map,
+                    const orbis::octree::bounding_box& known, const settings& s) {
   using enum nav::path_status;
   const auto distance = [&](const vec3& a, const vec3& b) { return (space.placed(a) - space.placed(b)).norm(); };
   std::string why{to_string(path.status)};
@@ -223,6 +224,10 @@ std::string explain(const nav::found_path& path, const Space& space, const Map& 
     why += text("; the nearest reachable position is %.3f,%.3f,%.3f, %.3f m from the goal", p.x(), p.y(), p.z(),
                 distance(p, s.to));
   }
+  if (path.status == start_outside || path.status == goal_outside) {
+    const auto corner = [](const vec3& p) { return text("%.3f,%.3f,%.3f", p.x(), p.y(), p.z()); };
+    why += "; the map extends from " + corner(known.min) + " to " + corner(known.max);
+  }
   return why;
 }
 
@@ -235,11 +240,11 @@ struct planned {
 };
 
 template <nav::planning_space Space, class Map>
-planned plan_in(const Space& space, const Map& map, const settings& s) {
+planned plan_in(const Space& space, const Map& map, const orbis::octree::bounding_box& known, const settings& s) {
   const auto start = console::clock::now();
   planned p{.path = nav::find_path(space, s.from, s.to), .why = {}};
   p.ms = std::chrono::duration<double, std::milli>(console::clock::now() - start).count();
-  if (p.path.status != nav::path_status::found) p.why = explain(p.path, space, map, s);
+  if (p.path.status != nav::path_status::found) p.why = explain(p.path, space, map, known, s);
   return p;
 }
 
@@ -278,17 +283,20 @@ exit_code plan(const settings& s, console& console) {
   console.finish(floor ? "floor map" : "distance field");
 
   console.stage("planning");
-  const nav::planning_options within{.region = box_to_search(*map, s)};
+  const orbis::octree::bounding_box known = known_space(*map);
+  const double margin = 1.0 + 2 * s.robot_radius;
+  const nav::planning_options within{
+      .region = {{(known.min.array() - margin).matrix(), (known.max.array() + margin).matrix()}}};
   const nav::vertical_cylinder cylinder{s.robot_radius, 0.0, s.robot_height};
-  const planned found = floor ? plan_in(nav::floor_view{*floor, s.robot_radius, {}, unknown}, *floor, s)
-                        : s.is_cylinder
-                            ? plan_in(nav::planning_view{*map, *field, cylinder, within}, *map, s)
-                            : plan_in(nav::planning_view{*map, *field, nav::ball{s.robot_radius}, within}, *map, s);
+  const planned found =
+      floor           ? plan_in(nav::floor_view{*floor, s.robot_radius, {}, unknown}, *floor, known, s)
+      : s.is_cylinder ? plan_in(nav::planning_view{*map, *field, cylinder, within}, *map, known, s)
+                      : plan_in(nav::planning_view{*map, *field, nav::ball{s.robot_radius}, within}, *map, known, s);
   const std::string outcome = found.why.empty()
                                   ? text("path of %.3f m over %zu points, straight line %.3f m, found in %.1f ms",
                                          found.path.length, found.path.points.size(), (s.to - s.from).norm(), found.ms)
                                   : "no path: " + std::string{to_string(found.path.status)};
-  console.finish(outcome);
+  console.finish(found.why.empty() ? text("%.1f ms", found.ms) : outcome);
 
   if (!s.picture.empty()) {
     const auto drawn = write_navigation_picture({.title = s.input.filename().string(),

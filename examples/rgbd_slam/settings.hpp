@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include <orbis/core/result.hpp>
@@ -108,6 +109,17 @@ struct settings {
   /// The maximum depth of the measurements in the map, metres; `usual` if the user specified none.
   [[nodiscard]] double depth_limit(double usual = usual_max_depth) const { return max_depth.value_or(usual); }
 };
+
+/// The error if `path` is a folder although a file is needed; names `usual` in it if there is such a file. Otherwise
+/// empty.
+[[nodiscard]] inline std::optional<orbis::error> needs_file(const std::filesystem::path& path, const char* usual) {
+  std::error_code ignored;
+  if (!std::filesystem::is_directory(path, ignored)) return std::nullopt;
+  const std::filesystem::path inside = path / usual;
+  return orbis::error{
+      orbis::errc::unreadable, path.string(),
+      "is a directory" + (std::filesystem::exists(inside, ignored) ? "; did you mean " + inside.string() + "?" : "")};
+}
 
 /// Returns true if a camera is given as a file, not as a preset.
 [[nodiscard]] inline bool is_file_name(const std::string& camera) {

@@ -297,23 +297,22 @@ std::optional<sensor_kind> wanted_sensor(const settings& s) {
   return s.sensor == "stereo" ? sensor_kind::stereo : s.sensor == "mono" ? sensor_kind::monocular : sensor_kind::rgbd;
 }
 
-/// Returns true if a file begins with text: printable characters without a zero byte.
-bool is_text(const std::filesystem::path& path) {
-  std::ifstream in{path, std::ios::binary};
-  std::string begin(1024, '\0');
-  in.read(begin.data(), static_cast<std::streamsize>(begin.size()));
-  begin.resize(static_cast<std::size_t>(in.gcount()));
-  return !begin.empty() && std::none_of(begin.begin(), begin.end(), [](char c) {
-    return static_cast<unsigned char>(c) < 0x20 && c != '\n' && c != '\r' && c != '\t' && c != '\f';
-  });
-}
-
 bool is_image(const std::filesystem::path& file) {
   const auto ending = file.extension();
   return ending == ".png" || ending == ".jpg" || ending == ".jpeg";
 }
 
+/// The message for a file of results, which is not a recording; empty for other files.
+std::string advice_on_results(const std::filesystem::path& file) {
+  const auto ending = file.extension();
+  if (ending == ".ply" || ending == ".pcd") return "is a point cloud, not a recording; use map";
+  if (ending == ".bt" || ending == ".ot") return "is an octree map, not a recording; use plan";
+  return {};
+}
+
 result<frame_source> open_file(const settings& s) {
+  if (std::string advice = advice_on_results(s.input); !advice.empty())
+    return fail(orbis::errc::unsupported, s.input.string(), std::move(advice));
   if (is_image(s.input))
     return fail(orbis::errc::unsupported, s.input.string(),
                 "is a single image; specify its folder, " + std::filesystem::absolute(s.input).parent_path().string());
@@ -597,8 +596,10 @@ result<void> check_images(frame_source& source, const settings& s) {
 }
 
 std::string describe(const frame_source& source) {
-  return source.title + ": " + (source.is_live ? "live camera" : std::to_string(source.frames) + " frames") + ", " +
-         std::to_string(source.camera.model.width()) + " x " + std::to_string(source.camera.model.height()) +
+  return source.title + ": " +
+         (source.is_live ? "live camera"
+                         : std::to_string(source.frames) + (source.frames == 1 ? " frame" : " frames")) +
+         ", " + std::to_string(source.camera.model.width()) + " x " + std::to_string(source.camera.model.height()) +
          (source.images_of.empty() ? "" : ", images from " + source.images_of) +
          (source.ground_truth.empty() ? "" : ", with ground truth") +
          (source.truth_of.empty() ? "" : " from " + source.truth_of) +
@@ -613,6 +614,16 @@ std::string origin_note(const orbis::vec3& origin) {
                 "the coordinates are far from their origin: all results are relative to (%.0f, %.0f, %.0f)", origin.x(),
                 origin.y(), origin.z());
   return text;
+}
+
+bool is_text(const std::filesystem::path& path) {
+  std::ifstream in{path, std::ios::binary};
+  std::string begin(1024, '\0');
+  in.read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  begin.resize(static_cast<std::size_t>(in.gcount()));
+  return !begin.empty() && std::none_of(begin.begin(), begin.end(), [](char c) {
+    return static_cast<unsigned char>(c) < 0x20 && c != '\n' && c != '\r' && c != '\t' && c != '\f';
+  });
 }
 
 bool is_recording(const std::filesystem::path& path) {
@@ -632,6 +643,8 @@ result<frame_source> open_source(const settings& s, console& console) {
       return result<frame_source>{fail(orbis::errc::invalid_argument, s.topics.empty() ? "--truth-topic" : "--topics",
                                        "needs a ROS bag, but " + s.input.string() + " is not a bag")};
     if (bag || std::filesystem::is_regular_file(s.input, ignored)) return open_file(s);
+    if (!std::filesystem::exists(s.input, ignored) && s.input.has_extension())
+      return result<frame_source>{fail(orbis::errc::not_found, s.input.string(), "no such file or folder")};
     if (is_result_folder(s.input) && s.sensor == "auto" && s.format == "auto")
       return result<frame_source>{
           fail(orbis::errc::unsupported, s.input.string(), "contains the results of a run, not a recording")};
