@@ -381,6 +381,7 @@ TEST_CASE("The shutter is found from the frames") {
     test::slam_system slam{frames.camera().model, settings};
     CHECK(std::isinf(slam.estimated_shutter()->read_out_deviation));
     for (std::size_t i = 0; i != frames.size(); ++i) slam.track(frames.frame(i).value());
+    CHECK(slam.estimated_shutter()->observed == Approx(frames.timestamp(249) - frames.timestamp(0)));
     return *slam.estimated_shutter();
   };
   const slam::shutter_estimate rolling =
@@ -393,4 +394,23 @@ TEST_CASE("The shutter is found from the frames") {
   const slam::shutter_estimate global = estimate_of({});
   CHECK(global.shutter.is_global());
   CHECK(global.read_out_deviation < 0.002);
+}
+
+TEST_CASE("A shutter that is already known from frames is revised later than a guess") {
+  io::synthetic_options o{.frames = 75, .fps = 30.0, .seed = 3, .width = 320, .height = 240, .frames_around = 400};
+  o.path.jitter = 3.0;
+  const io::synthetic_recording frames{o};
+  const auto last_shutter = [&](double observed) {
+    slam::options settings;
+    settings.shutter.color_read_out = settings.shutter.depth_read_out = 0.04;  // it is global
+    settings.estimates_shutter = true;
+    settings.earlier_estimate.observed = observed;
+    test::slam_system slam{frames.camera().model, settings};
+    slam::track_result found;
+    for (std::size_t i = 0; i != frames.size(); ++i) found = slam.track(frames.frame(i).value());
+    return found.shutter.color_read_out;
+  };
+  CHECK(last_shutter(0.0) < 0.02);
+  CHECK(last_shutter(1.6) < 0.02);  // revised after 2.4 s; the recording takes 2.47 s
+  CHECK(last_shutter(1.7) == 0.04);
 }

@@ -15,6 +15,7 @@
 #include <orbis/camera/shutter.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/features/orb.hpp>
+#include <orbis/slam/shutter_estimate.hpp>
 
 namespace orbis::slam {
 
@@ -235,10 +236,13 @@ struct options {
   std::size_t local_keyframes = 40;     ///< maximum number of keyframes whose landmarks are searched for in a frame
   camera::shutter shutter{};            ///< exposure times of the image rows; the default is a global shutter
   /// Estimates the shutter from the frames, starting from `shutter`, and applies significant changes during tracking:
-  /// after two seconds, and each time the observation time has grown by half. The existing map is not changed, and the
-  /// first frames of a map are not localised again. Takes a few milliseconds per frame. For recordings: estimate from
-  /// the first seconds (`system::estimated_shutter`), then restart with the result.
+  /// after two seconds, and each time the observation time has grown by half. The existing map is not changed. Takes
+  /// half a millisecond per frame. For recordings: estimate from the first seconds (`system::estimated_shutter`), then
+  /// start another system with the result (`shutter` and `earlier_estimate`).
   bool estimates_shutter = false;
+  /// With `estimates_shutter`: the estimate of another system for the same frames, from which `shutter` is taken.
+  /// Tracking does not revise it before it has observed 1.5 times as much. The default: `shutter` is a guess.
+  shutter_estimate earlier_estimate{};
   keyframe_options keyframes{};
   adjustment_options adjustment{};
   culling_options culling{};

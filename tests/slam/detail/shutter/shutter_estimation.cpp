@@ -67,10 +67,11 @@ void forget_changes(row_view& v) {
   for (slam::keypoint_as_read& k : v.read) k.change = {};
 }
 
-slam::shutter_estimate estimate(const camera::shutter& is, double motion, double noise, bool with_depth = true) {
+slam::shutter_estimate estimate(const camera::shutter& is, double motion, double noise, bool with_depth = true,
+                                const camera::shutter& assumed = {}) {
   random_bits random{5};
   shutter_estimator estimator;
-  for (std::uint64_t k = 0; k != 12; ++k) {
+  for (std::uint32_t k = 0; k != 12; ++k) {
     const row_view from = seen(se3::exp(random_motion(random, 0.02)), random_motion(random, motion), is, noise, random);
     for (int i = 0; i != 4; ++i) {
       row_view to = seen(se3::exp(random_motion(random, 0.02)), random_motion(random, motion), is, noise, random);
@@ -79,10 +80,10 @@ slam::shutter_estimate estimate(const camera::shutter& is, double motion, double
       if (!with_depth) forget_changes(before);
       const auto e = build_shutter_equations(before, to, rig, camera::shutter{});
       REQUIRE(e);
-      estimator.add(k, *e);
+      estimator.add({0, slam::keyframe_id{k}}, *e);
     }
   }
-  return estimator.estimate();
+  return estimator.estimate(assumed);
 }
 
 }  // namespace
@@ -110,6 +111,12 @@ TEST_CASE("A camera that hardly moves does not tell") {
   CHECK(found.read_out_deviation > 0.002);
 }
 
+TEST_CASE("What is assumed is kept if the estimate is insignificant and agrees") {
+  const camera::shutter is{.color_read_out = 0.02, .depth_read_out = 0.02}, wrong{.color_read_out = 0.06};
+  CHECK(estimate(is, 0.005, 0.5, true, is).shutter == is);
+  CHECK(estimate({}, 0.4, 0.5, true, wrong).shutter.is_global());
+}
+
 TEST_CASE("Without depth the read-out alone is found") {
   const auto found = estimate({.color_read_out = 0.02, .depth_read_out = 0.02}, 0.4, 0.3, false);
   CHECK(std::abs(found.shutter.color_read_out - 0.02) < 0.001);
@@ -123,8 +130,9 @@ TEST_CASE("Nothing is said of too few keyframes, and views that share little hav
   const auto e = build_shutter_equations(a, b, rig, {});
   REQUIRE(e);
   shutter_estimator estimator;
-  for (std::uint64_t k = 0; k != 7; ++k) estimator.add(k, *e);
+  for (std::uint32_t k = 0; k != 7; ++k) estimator.add({0, slam::keyframe_id{k}}, *e);
   CHECK(std::isinf(estimator.estimate().read_out_deviation));
+  CHECK(estimator.estimate({.color_read_out = 0.01}).shutter.color_read_out == 0.01);
   for (std::size_t i = 20; i != b.landmarks.size(); ++i) b.landmarks[i] = slam::no_id;
   CHECK_FALSE(build_shutter_equations(a, b, rig, {}));
 }

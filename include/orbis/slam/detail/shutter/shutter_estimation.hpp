@@ -34,7 +34,8 @@
 
 namespace orbis::slam::detail {
 
-/// A frame as read, with its motion estimated from the neighbouring frames.
+/// The keypoints of a frame that observe landmarks, as read, with the frame's motion estimated from the neighbouring
+/// frames.
 struct row_view {
   se3 T_world_camera;
   camera::shutter shutter{};
@@ -70,7 +71,7 @@ template <camera::camera_model Camera>
   constexpr double width = 3.5;  // of the Huber loss: both keypoints have errors
   std::vector<std::pair<landmark_id, std::uint32_t>> seen;
   for (std::uint32_t i = 0; i != from.read.size(); ++i)
-    if (from.landmarks[i] != no_id && from.read[i].depth > 0.0F) seen.emplace_back(from.landmarks[i], i);
+    if (from.read[i].depth > 0.0F) seen.emplace_back(from.landmarks[i], i);
   std::sort(seen.begin(), seen.end());
 
   const int height = rig.camera().height();
@@ -88,7 +89,6 @@ template <camera::camera_model Camera>
   vec2 gradient = zeros<vec2>();
   std::size_t count = 0;
   for (std::size_t i = 0; i != to.read.size(); ++i) {
-    if (to.landmarks[i] == no_id) continue;
     const auto at = std::lower_bound(seen.begin(), seen.end(), std::pair{to.landmarks[i], std::uint32_t{0}});
     if (at == seen.end() || at->first != to.landmarks[i]) continue;
     const keypoint_as_read& a = from.read[at->second];
@@ -144,30 +144,26 @@ template <camera::camera_model Camera>
 /// Sums the equations of a run and decides which components are significant.
 class shutter_estimator {
  public:
-  /// Adds the equations of a pair. `block`: an id common to all pairs of one keyframe.
-  void add(std::uint64_t block, const shutter_equations& e) {
-    if (blocks_.empty() || blocks_.back().first != block) {
-      const auto at = std::find_if(blocks_.begin(), blocks_.end(), [&](const auto& b) { return b.first == block; });
-      if (at != blocks_.end()) {
-        at->second.h += e.h;
-        at->second.c += e.c;
-        return;
-      }
-      blocks_.emplace_back(block, shutter_equations{});
+  /// Adds the equations of a pair with a keyframe. O(keyframes added since).
+  void add(map_keyframe keyframe, const shutter_equations& e) {
+    auto at = std::find_if(blocks_.rbegin(), blocks_.rend(), [&](const auto& b) { return b.first == keyframe; });
+    if (at == blocks_.rend()) {
+      blocks_.emplace_back(keyframe, shutter_equations{});
+      at = blocks_.rbegin();
     }
-    blocks_.back().second.h += e.h;
-    blocks_.back().second.c += e.c;
+    at->second.h += e.h;
+    at->second.c += e.c;
   }
   /// Discards all equations, after a change of the shutter for which they were built.
   void clear() { blocks_.clear(); }
 
-  /// Returns the current estimate. The threshold for keeping an assumed value is lower than that for adopting a new
-  /// one. O(keyframes).
+  /// Returns the current estimate. The threshold for revising an assumed value is lower than that for adopting a new
+  /// one; an assumed value that agrees with an insignificant estimate is kept. O(keyframes).
   [[nodiscard]] shutter_estimate estimate(const camera::shutter& assumed = {}) const {
     constexpr std::size_t enough = 8;
     // Errors of the velocity bias the estimates by up to these shares, as simulations show.
     constexpr double read_out_bias = 0.02, delay_bias = 0.1;
-    shutter_estimate result;
+    shutter_estimate result{.shutter = assumed};
     if (blocks_.size() < enough) return result;
     shutter_equations sum;
     for (const auto& [id, e] : blocks_) {
@@ -199,20 +195,22 @@ class shutter_estimator {
       result.delay = found[1];
       result.delay_deviation = deviation(covariance(1, 1), delay_bias * found[1]);
     }
-    const auto holds = [](double value, double deviation, double before, double least, double most) {
-      const double sigmas = before == 0.0 ? 5.0 : 2.5;
-      return std::abs(value) > sigmas * deviation && std::abs(value) >= least && std::abs(value) <= most;
+    const auto choose = [](double value, double deviation, double before, double least, double most) {
+      constexpr double adopting = 5.0, revising = 2.5;  // standard deviations
+      const double sigmas = before == 0.0 ? adopting : revising;
+      if (std::abs(value) > sigmas * deviation)
+        return std::abs(value) >= least && std::abs(value) <= most ? value : 0.0;
+      return std::abs(value - before) <= revising * deviation ? before : 0.0;
     };
     // Shorter read-out times have no relevant effect, and no camera has longer ones.
-    if (result.read_out > 0.0 && holds(result.read_out, result.read_out_deviation, assumed.color_read_out, 0.003, 0.07))
-      result.shutter.color_read_out = result.shutter.depth_read_out = result.read_out;
-    if (holds(result.delay, result.delay_deviation, assumed.depth_delay, 0.003, 0.05))
-      result.shutter.depth_delay = result.delay;
+    result.shutter.color_read_out = result.shutter.depth_read_out =
+        std::max(0.0, choose(result.read_out, result.read_out_deviation, assumed.color_read_out, 0.003, 0.07));
+    result.shutter.depth_delay = choose(result.delay, result.delay_deviation, assumed.depth_delay, 0.003, 0.05);
     return result;
   }
 
  private:
-  std::vector<std::pair<std::uint64_t, shutter_equations>> blocks_;
+  std::vector<std::pair<map_keyframe, shutter_equations>> blocks_;
 };
 
 }  // namespace orbis::slam::detail

@@ -28,16 +28,30 @@ namespace orbis::slam::detail {
 /// determined from both neighbouring frames. Periodically proposes the resulting shutter.
 class shutter_observer {
  public:
-  [[nodiscard]] shutter_estimate estimate() const { return estimate_.reported; }
+  /// `earlier`: see `options::earlier_estimate`.
+  explicit shutter_observer(const shutter_estimate& earlier) : estimate_{earlier, earlier}, decided_{earlier.observed} {
+    if (earlier.observed > 0.0) last_ = estimate_;
+  }
 
-  /// Adds a tracked frame that follows `last` (as tracked, with its current pose). `keyframe`: the keyframe created
-  /// from the frame, if any; `read`: reads the frame's depth image, also after the call. Returns the shutter to assume
-  /// for subsequent frames, if it changes.
+  [[nodiscard]] shutter_estimate estimate() const {
+    shutter_estimate e = estimate_.reported;
+    e.observed = std::max(watched_, e.observed);
+    return e;
+  }
+
+  /// Adds a tracked frame that follows `last` (as tracked, with its current pose) in the map `m` with the id `map`.
+  /// `keyframe`: the keyframe created from the frame, if any; `read`: reads the frame's depth image, also after the
+  /// call. Returns the shutter to assume for subsequent frames, if it changes.
   template <feature_descriptor D, camera::camera_model Camera>
   [[nodiscard]] std::optional<camera::shutter> add(const basic_frame<D>& last, const basic_frame<D>& f,
                                                    const std::optional<map_keyframe>& keyframe, row_reader read,
-                                                   const basic_map<D>& m, const camera_rig<Camera>& rig,
+                                                   map_id map, const basic_map<D>& m, const camera_rig<Camera>& rig,
                                                    const camera::shutter& assumed) {
+    if (map != map_) {  // ids of keyframes and landmarks are valid in one map only
+      views_.clear();
+      interrupt();
+      map_ = map;
+    }
     const vec6 motion = motion_between(last, f);
     if (before_ && before_that_) {
       // The velocity at the boundary of two intervals, from the mean velocities of three intervals: exact for motions
@@ -70,12 +84,16 @@ class shutter_observer {
   template <feature_descriptor D, camera::camera_model Camera>
   void set_pending(const basic_frame<D>& f, const std::optional<map_keyframe>& keyframe,
                    const camera_rig<Camera>& rig) {
-    pending_.read = f.as_read;
     pending_.shutter = f.shutter;
-    pending_.landmarks = f.landmarks;
-    pending_.information.resize(f.size());
-    for (std::size_t i = 0; i != f.size(); ++i)
-      pending_.information[i] = rig.scales.information(f.features.keypoints[i].octave);
+    pending_.read.clear();
+    pending_.landmarks.clear();
+    pending_.information.clear();
+    for (std::size_t i = 0; i != f.size(); ++i) {
+      if (f.landmarks[i] == no_id) continue;
+      pending_.read.push_back(f.as_read[i]);
+      pending_.landmarks.push_back(f.landmarks[i]);
+      pending_.information.push_back(rig.scales.information(f.features.keypoints[i].octave));
+    }
     pending_keyframe_ = keyframe;
   }
 
@@ -102,12 +120,11 @@ class shutter_observer {
     for (auto& [id, view] : views_) {
       if (!m.has_keyframe(id.keyframe)) continue;
       view.T_world_camera = m.at(id.keyframe).T_world_camera;
-      if (const auto e = build_shutter_equations(view, pending_, rig, assumed)) estimator_.add(id.keyframe.value(), *e);
+      if (const auto e = build_shutter_equations(view, pending_, rig, assumed)) estimator_.add(id, *e);
     }
   }
 
   void keep(map_keyframe id) {
-    if (!views_.empty() && views_.front().first.map != id.map) views_.clear();
     if (views_.size() == kept) views_.erase(views_.begin());
     views_.emplace_back(id, pending_);
   }
@@ -158,9 +175,11 @@ class shutter_observer {
   row_view pending_;
   row_reader read_;  ///< reads the depth image of the pending frame
   std::optional<map_keyframe> pending_keyframe_;
+  map_id map_ = no_id;  ///< the map of the views and of the pending frame
   /// Mean twist in the interval before the pending frame, and in the interval before that one.
   std::optional<vec6> before_, before_that_;
-  double watched_ = 0.0, decided_ = 0.0, looked_ = 0.0;  ///< seconds
+  double watched_ = 0.0, looked_ = 0.0;  ///< seconds
+  double decided_;                       ///< duration of the observation behind the assumed shutter, seconds
 };
 
 }  // namespace orbis::slam::detail

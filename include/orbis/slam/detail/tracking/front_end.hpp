@@ -262,9 +262,7 @@ class front_end {
       context_.depth.keep(anchor.reference, anchor.T_reference_camera, f.twist, f.shutter);
     if (start_.begins_map()) young_.begin_map(maps.active_id());
     if (made) young_.count_keyframe(made->map);
-    // While the shutter is being estimated, a frame may have been tracked with a different shutter than that of the
-    // map.
-    const bool may_wait = !made && !context_.observer && state == track_state::tracking && !f.held_by_depth;
+    const bool may_wait = !made && state == track_state::tracking && !f.held_by_depth;
     if (may_wait && context_.moving.size() == 0) young_.add(f, context_.depth_quadratic, log_);
     context_.set_last(std::move(f), anchor);
     if (!made) young_.localize_oldest(log_, maps);
@@ -272,9 +270,11 @@ class front_end {
   /// Passes a tracked frame to the shutter observer.
   void observe(const task& t, const std::optional<map_keyframe>& made) {
     if (!context_.follows_last(t.frame)) return context_.observer->interrupt();
-    if (const auto changed =
-            context_.observer->add(context_.last, t.frame, made, t.read_rows, t.map(), context_.rig, shutter_))
+    if (const auto changed = context_.observer->add(context_.last, t.frame, made, t.read_rows, t.maps.active_id(),
+                                                    t.map(), context_.rig, shutter_)) {
       shutter_ = *changed;
+      young_.forget();
+    }
   }
 
   context context_;

@@ -73,7 +73,7 @@ struct tracking_context {
         moving{used, given},
         depth{used, given.depth_term},
         patches{used, given.patches} {
-    if (given.estimates_shutter) observer.emplace();
+    if (given.estimates_shutter) observer.emplace(given.earlier_estimate);
   }
   tracking_context(const tracking_context&) = delete;  // its members refer to each other
   tracking_context& operator=(const tracking_context&) = delete;

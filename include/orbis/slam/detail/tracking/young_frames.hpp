@@ -49,6 +49,8 @@ class young_frames {
     count_ = 0;
     map_ = map;
   }
+  /// Forgets the waiting frames: the shutter has changed, and the next keyframes are made with the new one.
+  void forget() { waiting_.clear(); }
   /// Counts a keyframe of a map.
   void count_keyframe(map_id map) { keyframes_ += map == map_; }
 
