@@ -92,7 +92,8 @@ exit_code calibrate(const settings& s, console& console) {
 
   orbis::camera::camera_settings camera = source->camera;
   if (s.distortion) camera.model = with_lens(camera.model);
-  const shutter_results shutter = find_shutter(*source, s, false, console).shutter;
+  constexpr double first_seconds = 10.0;
+  const shutter_results shutter = find_shutter(*source, s, first_seconds, console);
   const auto found = calibrate_by(*source, s, shutter.shutter, camera.model, {.compares_lens = true}, console);
   if (!found) return give_up(found.error());
   const auto is_held_distortion = [](const calibrated_parameter& p) { return p.name == "k1" && p.is_held; };

@@ -14,6 +14,7 @@
 #include <orbis/camera/parameters.hpp>
 #include <orbis/slam/system.hpp>
 
+#include "interrupts.hpp"
 #include "slam_options.hpp"
 
 namespace app {
@@ -40,7 +41,9 @@ orbis::result<refined> refine(const any_camera& model, const frame_source& sourc
   orbis::slam::rgbd_system<any_camera> slam{model, options};
   read_ahead frames{source, s.threads != 1};
   std::optional<double> begin;
+  const auto cancelled = [&] { return orbis::fail(orbis::errc::cancelled, s.input.string(), "interrupted"); };
   for (std::size_t i = 0; frames.has_next(); ++i) {
+    if (interrupts::stop_requested()) return cancelled();
     const auto frame = frames.next();
     if (!frame) return orbis::fail(frame.error());
     if (!begin) begin = frame->timestamp;
@@ -51,9 +54,13 @@ orbis::result<refined> refine(const any_camera& model, const frame_source& sourc
   const orbis::slam::map_id map = slam.largest_map();
   orbis::trajectory poses = slam.trajectory(map);
   if (poses.empty()) return orbis::fail(orbis::errc::no_data, s.input.string(), "tracking never started");
+  const auto go_on = [&, show = console.progress()](std::size_t done, std::size_t total) {
+    return show(done, total) && !interrupts::stop_requested();
+  };
   const auto found = slam.inspect([&](const orbis::slam::atlas& maps) {
-    return orbis::slam::calibrate(maps.at(map), orbis::slam::make_rig(model, options), {}, console.progress());
+    return orbis::slam::calibrate(maps.at(map), orbis::slam::make_rig(model, options), {}, go_on);
   });
+  if (interrupts::stop_requested()) return cancelled();
   if (!found) return orbis::fail(orbis::errc::degenerate, s.input.string(), found.error().message);
   std::optional<lens_comparison> lens;
   if (limits.compares_lens && (is_last || is_last_round(*found)))

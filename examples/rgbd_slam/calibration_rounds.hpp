@@ -34,7 +34,7 @@ struct calibration_limits {
 };
 
 /// Runs rounds until the parameters no longer change. Errors: unreadable frames, no_data if tracking never starts,
-/// degenerate if the motion does not determine the camera.
+/// degenerate if the motion does not determine the camera, cancelled if the user interrupts a run.
 [[nodiscard]] orbis::result<calibration_rounds> calibrate_by(const frame_source& source, const settings& s,
                                                              const orbis::camera::shutter& shutter,
                                                              const orbis::camera::any_camera& given,

@@ -202,7 +202,7 @@ void add_shutter_option(CLI::App& cmd, settings& s) {
            if (value != "auto") s.read_out_ms = std::strtod(value.c_str(), nullptr);
          },
          "read-out time of the rolling shutter in milliseconds, top row first; 0: global shutter; auto (default): from "
-         "the camera file, or else estimated from the first ten seconds")
+         "the camera file, or else estimated during the run")
       ->check(CLI::Validator(
           [check = within(0.0, 200.0, " ms")](std::string& text) {
             const std::string why = text == "auto" ? std::string{} : check(text);
@@ -224,9 +224,8 @@ void add_switch(CLI::App& cmd, const std::string& name, bool& value, const std::
 void add_intrinsics_option(CLI::App& cmd, settings& s) {
   cmd.add_option_function<std::string>(
          "--intrinsics", [&s](const std::string& value) { s.refines_camera = value == "auto"; },
-         "auto: if the first ten seconds (see --read-out-ms) clearly contradict the focal length of the recording's "
-         "camera, calibrate the camera with the recording first; given: use the camera unchanged, as with --camera, "
-         "--load-map and --save-map")
+         "auto: if the images clearly contradict the focal length of the recording's camera, calibrate the camera with "
+         "the recording and begin again; given: use the camera unchanged, as with --camera, --load-map and --save-map")
       ->check(CLI::IsMember({"auto", "given"}))
       ->default_str("auto")
       ->type_name("W");

@@ -32,9 +32,10 @@ console console::for_dispensable() const {
 double console::elapsed() const { return std::chrono::duration<double>(clock::now() - stage_start_).count(); }
 double console::total() const { return std::chrono::duration<double>(clock::now() - program_start_).count(); }
 
-void console::stage(std::string_view name) {
+void console::stage(std::string_view name, clock::time_point start) {
   stage_ = name;
-  stage_start_ = last_shown_ = clock::now();
+  stage_start_ = start;
+  last_shown_ = clock::now();
   if (terminal_ && !quiet_ && !is_silent()) {
     std::fprintf(stderr, "\r\033[2K%-10s ...", stage_.c_str());
     std::fflush(stderr);

@@ -30,8 +30,8 @@ class console {
   /// A console for work that may be abandoned; once the work is abandoned, the console prints nothing.
   [[nodiscard]] console for_dispensable() const;
 
-  /// Starts a stage and ends the previous one.
-  void stage(std::string_view name);
+  /// Starts a stage, or continues one that began at `start`, and ends the previous one.
+  void stage(std::string_view name, clock::time_point start = clock::now());
   /// Shows the progress of the stage and the text `note`. Calls between redraws take almost no time.
   void advance(std::size_t done, std::size_t total, const std::string& note = {});
   /// Ends the stage and prints its outcome.

@@ -275,7 +275,8 @@ exit_code map_without_slam(const settings& s, console& console) {
     if (source->is_monocular())
       return give_up({orbis::errc::unsupported, s.input.string(), "a monocular recording cannot produce a map"});
     recording = *std::move(source);
-  } else if (const std::string option = option_of_recordings(s); !option.empty()) {
+  } else if (const std::string option = option_of_recordings(s);
+             !option.empty() && std::filesystem::exists(s.input, ignored)) {
     return console.error(
                {orbis::errc::invalid_argument, option, "needs a recording; " + s.input.string() + " is none"}),
            bad_usage;

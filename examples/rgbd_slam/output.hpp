@@ -19,7 +19,7 @@ namespace app {
 
 /// Writes trajectory.txt and keyframes.txt.
 [[nodiscard]] orbis::result<void> write_trajectories(const slam_results& slam, const std::filesystem::path& folder);
-/// Writes camera_used.toml: the camera and the shutter that the run used.
+/// Writes camera_used.toml: the camera that the run used, and its shutter, as given or as estimated at the end.
 [[nodiscard]] orbis::result<void> write_camera_used(const frame_source& source, const shutter_results& shutter,
                                                     const std::filesystem::path& folder);
 /// Writes pictures, report.html and summary.json.

@@ -21,6 +21,7 @@
 #include "navigation.hpp"
 #include "output.hpp"
 #include "result_files.hpp"
+#include "shutter_stage.hpp"
 #include "tracking_stage.hpp"
 #include "viewer/viewer.hpp"
 
@@ -37,6 +38,17 @@ std::optional<exit_code> check_files(const frame_source& source, const settings&
     return console.error(*conflict), bad_usage;
   if (const auto unwritable = find_unwritable(s)) return console.error(*unwritable), bad_input;
   return std::nullopt;
+}
+
+/// Tracks all frames. If the recording contradicts its camera, replaces the camera and tracks them again.
+orbis::result<tracked_frames> track_all(frame_source& source, const shutter_results& shutter, const settings& s,
+                                        const result_files& files, viewer& viewer, console& console) {
+  if (auto tracked = track(source, shutter, s, files, viewer, console); !tracked || !tracked->better_camera)
+    return tracked;
+  else
+    console.warn(replace_camera(source, *tracked->better_camera));
+  viewer.set_camera(source);
+  return track(source, shutter, s, files, viewer, console);
 }
 
 /// Copies the tracking results and their warnings to `r`.
@@ -230,26 +242,26 @@ exit_code run_slam(const settings& s, console& console) {
   if (!source) return give_up(source.error());
   if (const auto code = check_files(*source, s, console)) return *code;
 
-  // Estimate the camera's shutter and, if necessary, its intrinsics.
-  const shutter_results shutter = prepare_camera(*source, s, console);
+  // Estimate the camera's shutter; tracking refines the estimate.
+  constexpr double first_seconds = 5.0;
+  const shutter_results shutter = find_shutter(*source, s, first_seconds, console);
 
   // Open the viewer and the output folder.
   auto shown = viewer::open(s, *source, console);
   if (!shown) return console.error(shown.error()), bad_usage;
   auto files = result_files::begin(s);
   if (!files) return console.error(files.error()), code_of(files.error());
-  results r = begin_results(s, source->title, &*source, files->folder());
 
-  // Track all frames.
-  auto tracked = track(*source, shutter, s, *files, *shown, console);
+  auto tracked = track_all(*source, shutter, s, *files, *shown, console);
   if (!tracked) return give_up(tracked.error());
   if (source->rest) source->rest();
+  results r = begin_results(s, source->title, &*source, files->folder());
   if (tracked->stopped && tracked->slam.frames == 0) return give_up(*tracked->stopped);
   add_tracking(r, *tracked, *source, s, console);
   if (r.slam->tracked == 0) return end_untracked(r, *tracked, *source, s, *files, console);
   const auto write_poses = [&]() -> orbis::result<void> {
     auto written = write_trajectories(*r.slam, files->folder());
-    if (written) written = write_camera_used(*source, shutter, files->folder());
+    if (written) written = write_camera_used(*source, r.slam->shutter, files->folder());
     return written;
   };
   auto written = write_poses();

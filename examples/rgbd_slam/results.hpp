@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -17,6 +16,7 @@
 #include <orbis/core/result.hpp>
 #include <orbis/core/trajectory.hpp>
 #include <orbis/slam/frame.hpp>
+#include <orbis/slam/shutter_estimate.hpp>
 
 #include "frame_ranges.hpp"
 
@@ -82,8 +82,7 @@ struct world_results {
 struct shutter_results {
   std::string from;  ///< "given", "camera" or "estimated"
   orbis::camera::shutter shutter{};
-  double read_out_deviation = std::numeric_limits<double>::quiet_NaN();  ///< standard deviation of an estimate, seconds
-  double delay_deviation = std::numeric_limits<double>::quiet_NaN();     ///< standard deviation, seconds
+  orbis::slam::shutter_estimate estimate{};  ///< if estimated
 };
 
 /// The camera intrinsics of the run, pixels.

@@ -16,8 +16,6 @@
 namespace app {
 namespace {
 
-constexpr double first_seconds = 10.0;
-
 std::string milliseconds(double seconds, const char* format = "%.1f") {
   char buffer[40];
   std::snprintf(buffer, sizeof buffer, format, 1000.0 * seconds);
@@ -26,30 +24,23 @@ std::string milliseconds(double seconds, const char* format = "%.1f") {
 
 }  // namespace
 
-camera_inspection find_shutter(const frame_source& source, const settings& s, bool checks_camera, console& console) {
-  camera_inspection found;
-  shutter_results& result = found.shutter;
-  if (source.is_monocular()) {  // the correction needs motion in metres
-    result.from = "camera";
-    return found;
-  }
+shutter_results find_shutter(const frame_source& source, const settings& s, double seconds, console& console) {
+  shutter_results result;
+  result.from = "camera";
+  if (source.is_monocular()) return result;  // the correction needs motion in metres
   if (s.read_out_ms) {
     result.from = "given";
     result.shutter = source.camera.shutter.value_or(orbis::camera::shutter{});
     result.shutter.color_read_out = result.shutter.depth_read_out = 0.001 * *s.read_out_ms;
-    return found;
+    return result;
   }
   if (source.camera.shutter) {
-    result.from = "camera";
     result.shutter = *source.camera.shutter;
-    return found;
+    return result;
   }
-  // The estimate needs depth, and the first seconds of a live camera cannot be replayed.
-  if (source.sensor != orbis::slam::sensor_kind::rgbd || source.is_live) {
-    result.from = "camera";
-    return found;
-  }
+  if (source.sensor != orbis::slam::sensor_kind::rgbd) return result;  // the estimate needs depth
   result.from = "estimated";
+  if (source.is_live) return result;
   console.stage("shutter");
   orbis::slam::options options = slam_options(source.camera.model, source.camera.baseline);
   set_profile(s.profile, options);
@@ -62,20 +53,14 @@ camera_inspection find_shutter(const frame_source& source, const settings& s, bo
     const auto frame = frames.next();
     if (!frame) break;  // tracking reports the error
     if (!begin) begin = frame->timestamp;
-    if (frame->timestamp - *begin > first_seconds) break;
+    if (frame->timestamp - *begin > seconds) break;
     slam.track(*frame);
     console.advance(i + 1, source.frames, "tracking the first seconds");
   }
-  const auto estimate = *slam.estimated_shutter();
-  result.shutter = estimate.shutter;
-  result.read_out_deviation = estimate.read_out_deviation;
-  result.delay_deviation = estimate.delay_deviation;
+  result.estimate = *slam.estimated_shutter();
+  result.shutter = result.estimate.shutter;
   console.finish(describe(result));
-  if (!checks_camera) return found;
-  const orbis::slam::map_id most = slam.largest_map();
-  found.doubt = slam.inspect(
-      [&](const orbis::slam::atlas& maps) { return find_doubt(maps.at(most), source.camera.model, options); });
-  return found;
+  return result;
 }
 
 orbis::camera::camera_settings with_shutter(orbis::camera::camera_settings camera, const shutter_results& shutter) {
@@ -87,15 +72,17 @@ orbis::camera::camera_settings with_shutter(orbis::camera::camera_settings camer
 std::string describe(const shutter_results& r) {
   const bool estimated = r.from == "estimated";
   if (r.shutter.is_global())
-    return !estimated ? "global" : std::isfinite(r.read_out_deviation) ? "global or nearly global" : "assumed global";
+    return !estimated                                     ? "global"
+           : std::isfinite(r.estimate.read_out_deviation) ? "global or nearly global"
+                                                          : "assumed global";
   const auto value = [&](double seconds, double deviation) {
     return milliseconds(seconds) + (estimated ? " +- " + milliseconds(deviation) : "") + " ms";
   };
-  std::string text = "rolling, read-out time " + value(r.shutter.color_read_out, r.read_out_deviation);
+  std::string text = "rolling, read-out time " + value(r.shutter.color_read_out, r.estimate.read_out_deviation);
   if (r.shutter.depth_read_out != r.shutter.color_read_out)
     text += ", depth " + milliseconds(r.shutter.depth_read_out) + " ms";
   if (r.shutter.depth_delay != 0.0)
-    text += ", depth image " + value(std::abs(r.shutter.depth_delay), r.delay_deviation) +
+    text += ", depth image " + value(std::abs(r.shutter.depth_delay), r.estimate.delay_deviation) +
             (r.shutter.depth_delay > 0.0 ? " after colour" : " before colour");
   return text;
 }

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// The camera's shutter: given, or estimated from the first seconds of the recording.
+/// The camera's shutter: given, or estimated from the recording.
 #pragma once
 
-#include <optional>
 #include <string>
 
-#include "camera_check.hpp"
 #include "console.hpp"
 #include "results.hpp"
 #include "settings.hpp"
@@ -14,16 +12,11 @@
 
 namespace app {
 
-struct camera_inspection {
-  shutter_results shutter;
-  std::optional<focal_doubt>
-      doubt;  ///< doubt about the focal length, if a check was requested and the first seconds were tracked
-};
-
 /// Takes the shutter from `--read-out-ms`, or else from the camera's settings, or else estimates it: tracks the first
-/// ten seconds, up to the first unreadable frame. If `checks_camera` is true, also checks the focal length.
-[[nodiscard]] camera_inspection find_shutter(const frame_source& source, const settings& s, bool checks_camera,
-                                             console& console);
+/// `seconds` of the recording, up to the first unreadable frame. Live frames cannot be tracked twice; for them, a
+/// global shutter is assumed at first.
+[[nodiscard]] shutter_results find_shutter(const frame_source& source, const settings& s, double seconds,
+                                           console& console);
 
 /// The camera with the given shutter, for a camera file. An estimate of zero is omitted: it may only mean that this
 /// recording is inconclusive.

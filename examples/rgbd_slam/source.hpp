@@ -45,7 +45,8 @@ struct frame_source {
   std::size_t frames = 0;  ///< number of frames; for a live camera, the maximum number
   /// The number of frames of a live camera that were dropped because tracking was busy; empty for recordings.
   std::function<std::size_t()> dropped;
-  /// Reads or renders a frame, given its index after applying `--stride`. May be called from another thread.
+  /// Reads or renders a frame, given its index after applying `--stride`. May be called from several threads at once,
+  /// except for a live camera.
   std::function<orbis::result<source_frame>(std::size_t)> frame;
   /// Computes the depth image of a stereo frame, which takes a long time. Has no effect on other frames.
   void complete(source_frame& f) const;
@@ -69,7 +70,7 @@ struct frame_source {
 /// The warning that an origin is subtracted.
 [[nodiscard]] std::string origin_note(const orbis::vec3& origin);
 
-/// Returns true if a file begins with text: printable characters without a zero byte.
+/// Returns true if a file begins with text: printable characters without a zero byte. Also true if it cannot be opened.
 [[nodiscard]] bool is_text(const std::filesystem::path& path);
 
 /// Returns true if `open_source` recognises the layout of a folder or a bag. False for videos and for plain folders of

@@ -75,10 +75,10 @@ std::string summary_json(const results& r) {
   const auto milliseconds = [&](double seconds) { return std::isfinite(seconds) ? json(1000.0 * seconds) : null; };
   j["shutter"] = {{"from", s ? json(s->shutter.from) : null},
                   {"read_out_ms", s ? milliseconds(s->shutter.shutter.color_read_out) : null},
-                  {"read_out_deviation_ms", s ? milliseconds(s->shutter.read_out_deviation) : null},
+                  {"read_out_deviation_ms", s ? milliseconds(s->shutter.estimate.read_out_deviation) : null},
                   {"depth_read_out_ms", s ? milliseconds(s->shutter.shutter.depth_read_out) : null},
                   {"depth_delay_ms", s ? milliseconds(s->shutter.shutter.depth_delay) : null},
-                  {"depth_delay_deviation_ms", s ? milliseconds(s->shutter.delay_deviation) : null},
+                  {"depth_delay_deviation_ms", s ? milliseconds(s->shutter.estimate.delay_deviation) : null},
                   {"exposure_ms", s ? milliseconds(s->exposure) : null}};
   j["intrinsics"] = {{"from", s ? json(s->intrinsics.from) : null},
                      {"fx", s ? json(s->intrinsics.fx) : null},

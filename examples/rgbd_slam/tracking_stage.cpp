@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <functional>
 #include <new>
 #include <optional>
 #include <string>
@@ -16,10 +17,12 @@
 #include <orbis/slam/system.hpp>
 
 #include "../common/same_file.hpp"
+#include "camera_stage.hpp"
 #include "corrected_frame.hpp"
 #include "interrupts.hpp"
 #include "profiles.hpp"
 #include "result_files.hpp"
+#include "shutter_stage.hpp"
 #include "slam_options.hpp"
 #include "smooth_frame.hpp"
 #include "static_frame.hpp"
@@ -60,6 +63,8 @@ viewer_frame make_viewer_frame(const slam_system& slam, std::size_t i, const orb
 
 class camera_pace {
  public:
+  /// Delays all further frames.
+  void pause(console::clock::duration time) { begin_ += time; }
   /// Waits until a camera would deliver the frame with this timestamp, or until the run is interrupted.
   void wait_for(double timestamp) {
     if (!std::exchange(has_begun_, true)) first_ = timestamp;
@@ -103,22 +108,43 @@ bool is_planned_end(const orbis::error& e) {
   return e.code == orbis::errc::no_data || e.code == orbis::errc::cancelled;
 }
 
-/// Tracks frames until a frame is unreadable or Ctrl-C is pressed. Each map starts in a separate world frame.
+/// Checks the focal length of the camera with the largest map, and calibrates the camera if `may_calibrate` is true and
+/// the map clearly contradicts the focal length; `may_calibrate` is then false. Sets `camera_doubt` and
+/// `better_camera`.
+void check_camera(slam_system& slam, const frame_source& source, const orbis::slam::options& options,
+                  bool& may_calibrate, const settings& s, tracked_frames& out, console& console) {
+  slam.wait();
+  const map_id most = slam.largest_map();
+  const auto go_on = [](std::size_t, std::size_t) { return !interrupts::stop_requested(); };
+  out.camera_doubt = slam.inspect(
+      [&](const orbis::slam::atlas& maps) { return find_doubt(maps.at(most), source.camera.model, options, go_on); });
+  if (!may_calibrate || !out.camera_doubt || !out.camera_doubt->is_sure) return;
+  may_calibrate = false;
+  const auto estimate = slam.estimated_shutter();
+  out.better_camera =
+      refine_camera(source, estimate ? estimate->shutter : options.shutter, *out.camera_doubt, s, console);
+}
+
+/// Tracks frames until a frame is unreadable, Ctrl-C is pressed, or `is_enough` returns true for the time since the
+/// first frame (seconds). Each map starts in a separate world frame.
 void track_frames(slam_system& slam, const frame_source& source, const settings& s, upright_worlds& worlds,
-                  tracked_frames& out, viewer& viewer, console& console) {
+                  tracked_frames& out, const std::function<bool(double)>& is_enough, viewer& viewer, console& console) {
   using orbis::slam::track_state;
   read_ahead frames{source, s.threads != 1 && !source.is_live};
   frame_correction correct{source.camera.model};
   static_frames remove_moving{source.camera.model};
   frame_smoother smooth{source};
   camera_pace pace;
+  std::optional<double> begin;
   for (std::size_t i = 0; frames.has_next() && !interrupts::stop_requested(); ++i) {
     auto frame = frames.next();
     if (!frame) {
       if (!source.is_live || !is_planned_end(frame.error())) out.stopped = frame.error();
       break;
     }
-    if (s.realtime) pace.wait_for(frame->timestamp);
+    const double timestamp = frame->timestamp;
+    if (!begin) begin = timestamp;
+    if (s.realtime) pace.wait_for(timestamp);
     const auto start = console::clock::now();
     const auto took = [&] { return std::chrono::duration<double, std::milli>(console::clock::now() - start).count(); };
     slam.set_initial_pose([&, is_first = slam.state() == track_state::not_started] {
@@ -145,6 +171,9 @@ void track_frames(slam_system& slam, const frame_source& source, const settings&
     console.advance(i + 1, source.frames,
                     std::string{to_string(found.state)} + ", " + std::to_string(out.slam.keyframes_made) +
                         " keyframes" + (source.dropped ? ", " + std::to_string(source.dropped()) + " dropped" : ""));
+    const auto end = console::clock::now();
+    if (is_enough(timestamp - *begin)) break;
+    pace.pause(console::clock::now() - end);
   }
   slam.set_initial_pose(se3{});
   if (source.dropped) out.slam.dropped = source.dropped();
@@ -284,9 +313,12 @@ std::string describe(const slam_results& slam) {
 
 orbis::result<tracked_frames> track(const frame_source& source, const shutter_results& shutter, const settings& s,
                                     const result_files& files, viewer& viewer, console& console) {
+  const auto start = console::clock::now();
   console.stage("tracking");
   orbis::slam::options options = options_for(source, s);
   options.shutter = shutter.shutter;
+  options.estimates_shutter = shutter.from == "estimated";
+  options.earlier_estimate = shutter.estimate;
   slam_system slam = with_threads(viewer, console, [&] { return slam_system{source.camera.model, options}; });
   if (!s.load_map.empty())
     if (auto loaded = slam.load_map(s.load_map); !loaded) return orbis::fail(loaded.error());
@@ -298,7 +330,8 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
                      .live = {},
                      .stopped = {},
                      .unsaved = {},
-                     .camera_doubt = {}};
+                     .camera_doubt = {},
+                     .better_camera = {}};
   out.slam.sensor = source.sensor;
   if (s.live_map && !s.localize_only && !source.is_monocular())
     out.live = with_threads(viewer, console, [&] {
@@ -322,16 +355,40 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
     ++out.slam.keyframes_made;
     out.slam.lost_frames.remove(made.frame);  // the first of the two frames that initialise a map without depth
   }});
+  bool may_calibrate = may_refine(source, s);
+  console::clock::duration checking{};
+  double next_check = 10.0;  // seconds
+  const auto check = [&] {
+    const auto begin = console::clock::now();
+    check_camera(slam, source, options, may_calibrate, s, out, console);
+    checking += console::clock::now() - begin;
+    console.stage("tracking", start + checking);
+  };
+  const auto is_contradicted = [&](double seconds) {
+    if (!may_calibrate || seconds <= next_check) return false;
+    next_check *= 2.0;
+    check();
+    return out.better_camera.has_value();
+  };
   try {
-    track_frames(slam, source, s, worlds, out, viewer, console);
-    slam.wait();
-    if (out.live) out.live->wait();
+    track_frames(slam, source, s, worlds, out, is_contradicted, viewer, console);
+    if (!out.better_camera) slam.wait();
+    const bool has_map = source.sensor == orbis::slam::sensor_kind::rgbd && s.load_map.empty();
+    if (has_map && !out.better_camera && !interrupts::stop_requested()) check();
+    if (out.live && !out.better_camera) out.live->wait();
   } catch (const std::bad_alloc&) {
     out.stopped = {orbis::errc::exception, s.out.string(), "out of memory"};
   }
   stops_slam.reset();
   if (out.live) out.live->leave();
   connection.reset();
+  if (interrupts::stop_requested()) out.better_camera.reset();
+  if (out.better_camera) {
+    out.live.reset();
+    return out;
+  }
+  out.slam.shutter = shutter;
+  if (const auto estimate = slam.estimated_shutter()) out.slam.shutter = {shutter.from, estimate->shutter, *estimate};
   if (out.stopped && out.stopped->code == orbis::errc::exception) out.live.reset();  // frees most of the memory
 
   // The results describe the loaded map if the camera was relocalised in it, otherwise the map with the most frames.
@@ -341,15 +398,9 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
   out.missed_map = !s.load_map.empty() && !goes_on;
 
   collect(slam, out);
-  out.slam.shutter = shutter;
   out.slam.exposure = slam.exposure();
   const auto& k = source.camera.model.k();
   out.slam.intrinsics = {source.camera_is_refined ? "refined" : "given", k.fx, k.fy, k.cx, k.cy};
-  if (source.sensor == orbis::slam::sensor_kind::rgbd && s.load_map.empty() && !interrupts::stop_requested()) {
-    const auto go_on = [](std::size_t, std::size_t) { return !interrupts::stop_requested(); };
-    out.camera_doubt = slam.inspect(
-        [&](const orbis::slam::atlas& maps) { return find_doubt(maps.active(), source.camera.model, options, go_on); });
-  }
   if (goes_on)
     out.world = {"loaded map", {}};
   else if (!out.slam.trajectory.empty())

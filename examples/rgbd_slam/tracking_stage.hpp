@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include <orbis/camera/any.hpp>
 #include <orbis/core/result.hpp>
 
 #include "camera_check.hpp"
@@ -30,12 +31,18 @@ struct tracked_frames {
   std::optional<orbis::error> stopped;      ///< the error that ended the reading of frames early
   std::optional<orbis::error> unsaved;      ///< the error in saving the landmark map
   std::optional<focal_doubt> camera_doubt;  ///< evidence that the focal length is wrong
-  bool missed_map = false;                  ///< the camera was never found in the loaded map
+  /// A calibrated camera that replaces the given one. If set, tracking ended when it was found, and there are no other
+  /// results.
+  std::optional<orbis::camera::any_camera> better_camera;
+  bool missed_map = false;  ///< the camera was never found in the loaded map
 };
 
-/// Tracks the frames of the source until a frame is unreadable, Ctrl-C is pressed, or memory is exhausted. Errors: a
-/// map that cannot be loaded. `files`: where to write the landmark map, if the settings request one, and depth images
-/// that do not fit into memory (see `posed_frames`). `viewer` shows the progress.
+/// Tracks the frames of the source until a frame is unreadable, Ctrl-C is pressed, or memory is exhausted. If the
+/// shutter is estimated, the estimate begins with `shutter`. The focal length is checked at the end, unless a map was
+/// loaded, and if the camera may be replaced (`may_refine`), also after ten seconds and each time that has doubled. If
+/// the frames then clearly contradict it (`focal_doubt::is_sure`), the camera is calibrated. Errors: a map that cannot
+/// be loaded. `files`: where to write the landmark map, if the settings request one, and depth images that do not fit
+/// into memory (see `posed_frames`). `viewer` shows the progress.
 [[nodiscard]] orbis::result<tracked_frames> track(const frame_source& source, const shutter_results& shutter,
                                                   const settings& s, const result_files& files, viewer& viewer,
                                                   console& console);

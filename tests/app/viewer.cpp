@@ -383,6 +383,21 @@ TEST_CASE("The pixels that are kept for colours have a limit, and what is given 
   row.builder.finish(row.sources);
   CHECK(scene.is_over);
   CHECK(row.builder.color_samples() == 0);
+
+  // A second run begins with an empty scene, and viewers see that it has changed.
+  const auto graph = scene.graph.revision, voxels = scene.voxels.revision;
+  row.builder.begin();
+  CHECK_FALSE(scene.is_over);
+  CHECK_FALSE(scene.frame);
+  CHECK(scene.graph.revision > graph);
+  CHECK(scene.graph.trail.empty());
+  CHECK(scene.voxels.revision > voxels);
+  for (const auto& [index, block] : scene.voxels.blocks) CHECK(block.voxels.empty());
+  row.push(0);
+  static_cast<void>(row.builder.update_at_once(row.sources));
+  CHECK(scene.frame);
+  CHECK(scene.graph.trail.size() == 1);
+  CHECK(row.builder.color_samples() > 0);
 }
 
 TEST_CASE("Keyframes that nobody takes do not pile up, and without a live map none of their pixels are kept") {

@@ -262,6 +262,26 @@ void scene_builder::set_voxels(std::vector<voxel> colored) {
   forget_colors();
 }
 
+void scene_builder::set_camera(orbis::camera::ray_table rays) {
+  rays_ = std::move(rays);
+  scene_.camera = corner_rays(rays_);
+}
+
+void scene_builder::begin() {
+  if (!std::exchange(scene_.is_over, false)) return;
+  scene_.frame.reset();
+  scene_.graph = {scene_.graph.revision + 1, {}, {}, {}};
+  const std::size_t frames = scene_.numbers.frames;
+  scene_.numbers = {};
+  scene_.numbers.frames = frames;
+  show_cubes();  // there are none
+  tracking_ms_.clear();
+  frames_seen_ = 0;
+  takes_colors_ = scene_.voxels.absent.empty();
+  last_reference_.reset();
+  was_lost_ = true;
+}
+
 void scene_builder::finish(const scene_sources& sources) {
   scene_.is_over = true;
   static_cast<void>(update_at_once(sources));

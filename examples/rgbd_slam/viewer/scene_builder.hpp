@@ -75,6 +75,11 @@ class scene_builder {
   scene_builder& operator=(const scene_builder&) = delete;
   ~scene_builder();
 
+  /// Replaces the camera. No other function may run at the same time; the same holds for `begin`.
+  void set_camera(orbis::camera::ray_table rays);
+  /// Prepares for the first frame of a run; after `finish`, clears the scene.
+  void begin();
+
   /// Adds a frame. Lock-free; never waits for the other functions. If the previous frame is not in the scene yet, this
   /// frame replaces it, but the points of the path and the colours of keyframes are kept. Stores a limited number of
   /// colours between two updates, and samples the colours of a keyframe during the call. Call it from one thread only.
@@ -159,7 +164,7 @@ class scene_builder {
   void show_cubes();
   void update_numbers(const scene_sources& sources);
 
-  const orbis::camera::ray_table rays_;
+  orbis::camera::ray_table rays_;
   const double resolution_;
   const int step_;  // pixels from one sample to the next
   const std::size_t max_samples_;

@@ -33,6 +33,10 @@ orbis::result<viewer> viewer::open(const settings& s, const frame_source& source
   return made;
 }
 
+void viewer::set_camera(const frame_source& source) {
+  if (thread_) thread_->set_camera(orbis::camera::ray_table{source.camera.model});
+}
+
 viewer::connection::connection(viewer& v, scene_sources sources) : viewer_{v} {
   if (v.thread_) v.thread_->connect(std::move(sources));
 }

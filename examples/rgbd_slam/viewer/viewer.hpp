@@ -26,6 +26,9 @@ class viewer {
   /// Opens the viewer selected in the settings and prints its address. Errors: no display; the port is in use.
   [[nodiscard]] static orbis::result<viewer> open(const settings& s, const frame_source& source, console& console);
 
+  /// Replaces the camera, between two connections.
+  void set_camera(const frame_source& source);
+
   /// If the viewer is open, shows the frame that `make()` returns. Call it from one thread only.
   template <std::invocable Make>
   void show(Make&& make) noexcept {

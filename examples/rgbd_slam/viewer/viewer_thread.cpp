@@ -93,6 +93,11 @@ std::string viewer_thread::take_error() {
   }
 }
 
+void viewer_thread::set_camera(orbis::camera::ray_table rays) {
+  const std::lock_guard lock{mutex_};
+  builder_.set_camera(std::move(rays));
+}
+
 void viewer_thread::connect(scene_sources sources) {
   if (!is_open()) return;
   if (sources.graph)
@@ -108,6 +113,7 @@ void viewer_thread::connect(scene_sources sources) {
       return results;
     };
   const std::lock_guard lock{mutex_};
+  builder_.begin();
   sources_ = std::move(sources);
 }
 

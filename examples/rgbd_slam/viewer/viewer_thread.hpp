@@ -57,7 +57,9 @@ class viewer_thread {
     }
   }
 
-  /// Connects the sources. This and the next two functions wait until the current drawing is complete.
+  /// Replaces the camera. This and the next three functions wait until the current drawing is complete.
+  void set_camera(orbis::camera::ray_table rays);
+  /// Connects the sources of a run.
   void connect(scene_sources sources);
   /// Queries the sources one last time and disconnects them.
   void disconnect();
