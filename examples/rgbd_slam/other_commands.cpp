@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <algorithm>
 #include <cstddef>
+#include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <numbers>
 #include <optional>
 #include <string>
@@ -226,8 +228,10 @@ exit_code evaluate(const settings& s, console& console) {
   const auto give_up = [&](const orbis::error& e) { return console.error(e), bad_input; };
   for (const std::filesystem::path& path : {s.input, s.reference}) {
     if (const auto folder = needs_file(path, "trajectory.txt")) return give_up(*folder);
+    std::ifstream file;  // reading only from files that can be read twice
     std::error_code ignored;
-    if (std::filesystem::is_regular_file(path, ignored) && !std::filesystem::is_empty(path, ignored) && !is_text(path))
+    if (std::filesystem::is_regular_file(path, ignored)) file.open(path);
+    if (file.is_open() && file.peek() != EOF && !is_text(path))
       return give_up({orbis::errc::unsupported, path.string(), "is not a trajectory: trajectories are text files"});
   }
   auto estimate = orbis::io::read_trajectory_file(s.input);

@@ -618,7 +618,6 @@ std::string origin_note(const orbis::vec3& origin) {
 
 bool is_text(const std::filesystem::path& path) {
   std::ifstream in{path, std::ios::binary};
-  if (!in) return true;  // the reader reports the reason
   std::string begin(1024, '\0');
   in.read(begin.data(), static_cast<std::streamsize>(begin.size()));
   begin.resize(static_cast<std::size_t>(in.gcount()));

@@ -70,7 +70,7 @@ struct frame_source {
 /// The warning that an origin is subtracted.
 [[nodiscard]] std::string origin_note(const orbis::vec3& origin);
 
-/// Returns true if a file begins with text: printable characters without a zero byte. Also true if it cannot be opened.
+/// Returns true if a file begins with text: printable characters without a zero byte.
 [[nodiscard]] bool is_text(const std::filesystem::path& path);
 
 /// Returns true if `open_source` recognises the layout of a folder or a bag. False for videos and for plain folders of

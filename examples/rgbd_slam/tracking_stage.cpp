@@ -22,7 +22,6 @@
 #include "interrupts.hpp"
 #include "profiles.hpp"
 #include "result_files.hpp"
-#include "shutter_stage.hpp"
 #include "slam_options.hpp"
 #include "smooth_frame.hpp"
 #include "static_frame.hpp"
