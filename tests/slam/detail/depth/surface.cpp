@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstring>
+#include <optional>
 
 #include <orbis/core/simd/level.hpp>
 #include <orbis/slam/detail/depth/surface.hpp>
@@ -27,6 +28,22 @@ std::size_t count(const surface& s) {
   return static_cast<std::size_t>(
       std::count_if(s.cells.begin(), s.cells.end(), [](const surface_cell& c) { return c.is_there(); }));
 }
+
+/// A lens with rays only up to a column.
+struct half_lens {
+  camera::pinhole inner;
+  double last;  ///< pixels
+
+  [[nodiscard]] int width() const { return inner.width(); }
+  [[nodiscard]] int height() const { return inner.height(); }
+  [[nodiscard]] std::optional<vec2> project(const vec3& p) const { return inner.project(p); }
+  [[nodiscard]] std::optional<vec2> project(const vec3& p, matrix<2, 3>& jacobian) const {
+    return inner.project(p, jacobian);
+  }
+  [[nodiscard]] std::optional<vec3> unproject(const vec2& pixel) const {
+    return pixel.x() <= last ? inner.unproject(pixel) : std::nullopt;
+  }
+};
 
 }  // namespace
 
@@ -97,4 +114,17 @@ TEST_CASE("The cells are the same with every instruction set, also in the last c
     if (expected.empty()) expected = s;
     CHECK(std::memcmp(s.cells.data(), expected.cells.data(), s.cells.size() * sizeof(surface_cell)) == 0);
   }
+}
+
+TEST_CASE("A cell at the edge of a lens needs no ray beyond its middle") {
+  const auto camera = test::small_rig().camera();
+  const image<float> depth = test::depth_of(test::wall(), se3{}, camera);
+  const surface whole = surface_of(depth);
+  surface half;
+  slam::detail::surface_builder<half_lens> builder;
+  builder.build(half_lens{camera, 161.7}, test::metres(depth), 1.0 / 400.0, 0.1, 10.0, half);
+  const std::size_t last = 30 * 80 + 40;  // its middle is at column 161.5
+  REQUIRE(half.cells[last].is_there());
+  CHECK((half.cells[last].point() - whole.cells[last].point()).norm() < 1e-4);
+  CHECK_FALSE(half.cells[last + 1].is_there());
 }

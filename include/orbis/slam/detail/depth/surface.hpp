@@ -181,13 +181,19 @@ class surface_builder {
       for (int column = 0; column != to.columns; ++column) {
         const vec2 middle((column + 0.5) * to.step - 0.5, (row + 0.5) * to.step - 0.5);
         const auto r = camera.unproject(middle);
-        const auto left = camera.unproject(middle - vec2(0.5, 0.0)), right = camera.unproject(middle + vec2(0.5, 0.0));
-        const auto above = camera.unproject(middle - vec2(0.0, 0.5)), below = camera.unproject(middle + vec2(0.0, 0.5));
-        if (r && left && right && above && below)
-          rays_.push_back({static_cast<float>(r->x()), static_cast<float>(r->y()),
-                           static_cast<float>(right->x() - left->x()), static_cast<float>(below->y() - above->y())});
-        else
+        if (!r) {
           rays_.push_back({none, none, none, none});
+          continue;
+        }
+        // The change per pixel along one axis; at the edge of a lens, one of the neighbours has no ray.
+        const auto change = [&](int axis, const vec2& half) {
+          const auto before = camera.unproject(middle - half), after = camera.unproject(middle + half);
+          const double pixels = 0.5 * (before.has_value() + after.has_value());
+          if (pixels == 0.0) return 0.0F;
+          return static_cast<float>((after.value_or(*r)[axis] - before.value_or(*r)[axis]) / pixels);
+        };
+        rays_.push_back({static_cast<float>(r->x()), static_cast<float>(r->y()), change(0, vec2(0.5, 0.0)),
+                         change(1, vec2(0.0, 0.5))});
       }
   }
 
