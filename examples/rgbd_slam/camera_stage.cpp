@@ -11,8 +11,8 @@ namespace app {
 
 bool may_refine(const frame_source& source, const settings& s) {
   const bool shares_map = !s.load_map.empty() || !s.save_map.empty();
-  return source.sensor == orbis::slam::sensor_kind::rgbd && !source.is_live && !source.made &&
-         !source.camera_is_refined && s.refines_camera && s.camera.empty() && !shares_map;
+  return source.sensor == orbis::slam::sensor_kind::rgbd && !source.made && !source.camera_is_refined &&
+         s.refines_camera && s.camera.empty() && !shares_map;
 }
 
 std::optional<orbis::camera::any_camera> refine_camera(const frame_source& source,

@@ -284,7 +284,7 @@ exit_code map_without_slam(const settings& s, console& console) {
     return console.error(
                {orbis::errc::invalid_argument, option, "needs a recording; " + s.input.string() + " is none"}),
            bad_usage;
-  } else if (const auto ending = s.input.extension(); ending == ".bt" || ending == ".ot") {
+  } else if (is_octree_file(s.input)) {
     return give_up({orbis::errc::unsupported, s.input.string(), "is an octree map already; plan finds paths in it"});
   }
   const auto inputs = input_files(s, recording ? recording->files : std::vector<std::filesystem::path>{});

@@ -121,6 +121,11 @@ struct settings {
       "is a directory" + (std::filesystem::exists(inside, ignored) ? "; did you mean " + inside.string() + "?" : "")};
 }
 
+/// Returns true if the name of a file is that of an octree map.
+[[nodiscard]] inline bool is_octree_file(const std::filesystem::path& file) {
+  return file.extension() == ".bt" || file.extension() == ".ot";
+}
+
 /// Returns true if a camera is given as a file, not as a preset.
 [[nodiscard]] inline bool is_file_name(const std::string& camera) {
   return camera.find_first_of("./") != std::string::npos;

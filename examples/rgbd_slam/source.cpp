@@ -306,7 +306,7 @@ bool is_image(const std::filesystem::path& file) {
 std::string advice_on_results(const std::filesystem::path& file) {
   const auto ending = file.extension();
   if (ending == ".ply" || ending == ".pcd") return "is a point cloud, not a recording; use map";
-  if (ending == ".bt" || ending == ".ot") return "is an octree map, not a recording; use plan";
+  if (is_octree_file(file)) return "is an octree map, not a recording; use plan";
   return {};
 }
 
