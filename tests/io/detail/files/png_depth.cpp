@@ -25,8 +25,8 @@ using orbis::test::big_endian;
 using orbis::test::libpng_file;
 using orbis::test::png_chunk;
 
-orbis::image<std::uint16_t> some_depth() {
-  orbis::image<std::uint16_t> depth(33, 21);
+orbis::image<std::uint16_t> some_depth(int width = 33, int height = 21) {
+  orbis::image<std::uint16_t> depth(width, height);
   orbis::random_bits random{5};
   for (auto& d : depth.pixels()) d = static_cast<std::uint16_t>(random.below(3) == 0 ? 0 : 1000 + random.below(40000));
   return depth;
@@ -57,6 +57,21 @@ TEST_CASE("plain depth images of every filter are decoded, whole or split") {
   check([](png_structp png) { png_set_filter(png, 0, PNG_FILTER_AVG); });
   check([](png_structp png) { png_set_filter(png, 0, PNG_FILTER_PAETH); });
   check([](png_structp png) { png_set_compression_buffer_size(png, 100); });
+}
+
+TEST_CASE("depth images of any size are decoded, with a filter of its own for each row") {
+  for (const int width : {1, 2, 14, 15, 40})
+    for (const int height : {1, 7, 8, 9, 24}) {
+      CAPTURE(width, height);
+      auto depth = some_depth(width, height);
+      for (int y = 0; y != height; ++y)  // rows for which libpng chooses different filters
+        for (int x = 0; x != width; ++x)
+          if (y % 4 != 0) depth(x, y) = static_cast<std::uint16_t>(y % 4 == 1 ? 257 * x : y % 4 == 2 ? 1000 : x * y);
+      const auto read = decode_plain_depth(
+          file_of(depth, PNG_INTERLACE_NONE, [](png_structp png) { png_set_filter(png, 0, PNG_ALL_FILTERS); }));
+      REQUIRE(read.has_value());
+      CHECK(*read == depth);
+    }
 }
 
 TEST_CASE("what is not a plain depth image is left to libpng") {

@@ -9,10 +9,12 @@
 
 #ifdef ORBIS_LIBDEFLATE
 
+#include <algorithm>
+#include <array>
 #include <bit>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <memory>
 #include <optional>
 #include <string_view>
@@ -22,6 +24,10 @@
 
 #include <orbis/core/bytes.hpp>
 #include <orbis/core/image.hpp>
+#include <orbis/core/simd/convert.hpp>
+#include <orbis/core/simd/dispatch.hpp>
+#include <orbis/core/simd/shuffle.hpp>
+#include <orbis/core/simd/vec.hpp>
 #include <orbis/io/detail/files/image_limits.hpp>
 
 namespace orbis::io::detail {
@@ -61,36 +67,106 @@ template <class = void>
   }
 }
 
-/// Reverses the filter of a row of 16-bit pixels, given the row above.
-template <class = void>
-[[nodiscard]] bool unfilter_depth_row(unsigned filter, unsigned char* row, const unsigned char* above,
-                                      std::size_t width) {
-  const auto each = [&](const auto& predict) {  // predicts from the bytes to the left, above, and above left
-    for (std::size_t byte = 0; byte != 2; ++byte)
-      for (std::size_t i = byte, before = 0, corner = 0; i < 2 * width; i += 2) {
-        row[i] = static_cast<unsigned char>(row[i] +
-                                            predict(static_cast<int>(before), int{above[i]}, static_cast<int>(corner)));
-        before = row[i];
-        corner = above[i];
-      }
-    return true;
-  };
-  switch (filter) {
-    case 0: return true;
-    case 1: return each([](int a, int, int) { return a; });
-    case 2:
-      for (std::size_t i = 0; i != 2 * width; ++i) row[i] = static_cast<unsigned char>(row[i] + above[i]);
-      return true;
-    case 3: return each([](int a, int b, int) { return (a + b) / 2; });
-    case 4:
-      return each([](int a, int b, int c) {
-        const int of_a = std::abs(b - c), of_b = std::abs(a - c), of_c = std::abs(a + b - 2 * c);
-        const int vertical = of_b <= of_c ? b : c;
-        return of_a <= of_b && of_a <= of_c ? a : vertical;
-      });
-    default: return false;
+/// Reverses the filters of 16-bit grey pixels. A filter predicts a byte from bytes to the left and above, so the pixels
+/// of a row depend on each other: eight rows are decoded at the same time, each two pixels behind the row above it.
+class depth_unfilter {
+ public:
+  /// @param raw  for each row of `out`: a filter from 0 to 4, then the filtered bytes
+  depth_unfilter(const unsigned char* raw, image<std::uint16_t>& out) : raw_{raw}, out_{out} {
+    for (int y = 0; y < out.height(); y += rows) decode(y);
   }
-}
+
+ private:
+  static constexpr int rows = 8, lag = 2 * (rows - 1);
+  using bytes = simd::vec<std::int16_t, 8, simd::portable>;    // of one pixel in each of four rows
+  using pixels = simd::vec<std::uint32_t, 4, simd::portable>;  // the same: first byte + 2^16 * second byte
+
+  /// Four rows. The pixel above the next one of a row is `before` of the row above, two steps ago.
+  struct group {
+    bytes is_left, is_above, is_mean, is_paeth;  // masks of rows by their filter
+    bytes left{0}, corner{0}, before{0};
+
+    [[nodiscard]] ORBIS_ALWAYS_INLINE pixels step(std::uint64_t filtered, const pixels& row_above) noexcept {
+      simd::vec<std::uint8_t, 8, simd::portable> packed;
+      std::memcpy(&packed, &filtered, sizeof packed);
+      const bytes above =
+          simd::bits_as<std::int16_t>(simd::shuffle<7, 0, 1, 2>(simd::bits_as<std::uint32_t>(before), row_above));
+      const bytes to_left = above - corner, to_above = left - corner, to_corner = to_left + to_above;
+      const bytes of_left = max(to_left, 0 - to_left), of_above = max(to_above, 0 - to_above);
+      const bytes nearest = min(max(to_corner, 0 - to_corner), min(of_above, of_left));
+      const bytes paeth = select(of_left == nearest, left, select(of_above == nearest, above, corner));
+      const bytes predicted =
+          (paeth & is_paeth) | ((left & is_left) | (above & is_above) | (((left + above) >> 1) & is_mean));
+      before = left;
+      corner = above;
+      left = simd::bits_as<std::int16_t>(simd::bits_as<std::uint8_t>(simd::convert<std::int16_t>(packed)) +
+                                         simd::bits_as<std::uint8_t>(predicted));
+      const pixels both = simd::bits_as<std::uint32_t>(left);
+      return (both << 8) | (both >> 16);  // the pixel is in the lower 16 bits
+    }
+  };
+
+  void decode(int y) {
+    const int width = out_.width(), last = std::min(rows, out_.height() - y) - 1;
+    std::array<const unsigned char*, rows> from;
+    std::array<std::uint16_t*, rows> to;
+    std::array<std::array<std::int16_t, rows>, 2> filters;
+    for (int i = 0; i != rows; ++i) {
+      const int row = y + std::min(i, last);
+      const auto k = static_cast<std::size_t>(i);
+      from[k] = raw_ + static_cast<std::size_t>(row) * (2 * static_cast<std::size_t>(width) + 1) + 1;
+      to[k] = out_.row(row).data();
+      filters[k / 4][2 * (k % 4)] = filters[k / 4][2 * (k % 4) + 1] = from[k][-1];
+    }
+    const auto group_of = [](const std::array<std::int16_t, rows>& of_rows) {
+      const bytes filter = bytes::load(of_rows.data());
+      const auto mask = [&](std::int16_t value) { return select(filter == bytes(value), bytes(-1), bytes(0)); };
+      return group{.is_left = mask(1), .is_above = mask(2), .is_mean = mask(3), .is_paeth = mask(4)};
+    };
+    group upper = group_of(filters[0]), lower = group_of(filters[1]);
+    const std::uint16_t* const above = y == 0 ? nullptr : out_.row(y - 1).data();
+    // Row i is at x = t - 2 i. `get` returns the two bytes of a pixel there, zero to the left of the image.
+    const auto step = [&](int t, const auto& get, const auto& put) ORBIS_INLINE_LAMBDA {
+      const auto four = [&](std::size_t i) ORBIS_INLINE_LAMBDA {
+        return get(i, t) | get(i + 1, t) << 16U | get(i + 2, t) << 32U | get(i + 3, t) << 48U;
+      };
+      const auto put_four = [&](std::size_t i, const pixels& four_pixels) ORBIS_INLINE_LAMBDA {
+        std::array<std::uint32_t, 4> v;
+        four_pixels.store(v.data());
+        put(i, t, v[0]), put(i + 1, t, v[1]), put(i + 2, t, v[2]), put(i + 3, t, v[3]);
+      };
+      const std::uint32_t pixel = above != nullptr && t < width ? above[t] : 0U;
+      const pixels row_above = simd::bits_as<std::uint32_t>(upper.before);
+      put_four(0, upper.step(four(0), pixels(pixel >> 8U | (pixel & 255U) << 16U)));
+      put_four(4, lower.step(four(4), row_above));
+    };
+    const auto get = [&](std::size_t i, int t) ORBIS_INLINE_LAMBDA {
+      std::uint16_t two;
+      std::memcpy(&two, from[i] + 2 * (t - 2 * static_cast<int>(i)), 2);
+      return std::uint64_t{two};
+    };
+    const auto put = [&](std::size_t i, int t, std::uint32_t pixel) ORBIS_INLINE_LAMBDA {
+      to[i][t - 2 * static_cast<int>(i)] = static_cast<std::uint16_t>(pixel);
+    };
+    const auto is_inside = [&](std::size_t i, int t) {
+      const int x = t - 2 * static_cast<int>(i);
+      return x >= 0 && x < width && static_cast<int>(i) <= last;
+    };
+    const auto get_inside = [&](std::size_t i, int t) { return is_inside(i, t) ? get(i, t) : 0; };
+    const auto put_inside = [&](std::size_t i, int t, std::uint32_t pixel) {
+      if (is_inside(i, t)) put(i, t, pixel);
+    };
+    const bool is_whole = last == rows - 1 && width > lag;
+    for (int t = 0; t < width + lag; ++t)
+      if (is_whole && t >= lag && t < width)
+        step(t, get, put);
+      else
+        step(t, get_inside, put_inside);
+  }
+
+  const unsigned char* raw_;
+  image<std::uint16_t>& out_;
+};
 
 /// Decodes a non-interlaced 16-bit grey PNG file in half the time of libpng. Empty for all other files and damaged
 /// files, which libpng decodes or reports. Allocates a copy of the compressed pixels, the decompressed bytes (at most
@@ -110,17 +186,10 @@ template <class = void>
   if (!inflate || libdeflate_zlib_decompress(inflate.get(), packed->pixels.data(), packed->pixels.size(), raw.get(),
                                              raw_bytes, nullptr) != LIBDEFLATE_SUCCESS)
     return std::nullopt;
-  const std::vector<unsigned char> zeros(2 * std::size_t{packed->width});
-  const unsigned char* above = zeros.data();
+  for (std::uint64_t at = 0; at != raw_bytes; at += row_bytes)
+    if (raw[at] > 4) return std::nullopt;
   image<std::uint16_t> out(static_cast<int>(packed->width), static_cast<int>(packed->height));
-  for (int y = 0; y != out.height(); ++y) {
-    unsigned char* const row = raw.get() + static_cast<std::size_t>(y) * row_bytes + 1;
-    if (!unfilter_depth_row(row[-1], row, above, packed->width)) return std::nullopt;
-    above = row;
-    std::uint16_t* const to = out.row(y).data();
-    for (std::size_t x = 0; x != packed->width; ++x)
-      to[x] = static_cast<std::uint16_t>(row[2 * x] << 8U | row[2 * x + 1]);
-  }
+  depth_unfilter(raw.get(), out);
   return out;
 }
 
