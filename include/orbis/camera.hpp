@@ -18,7 +18,7 @@
 /// | `undistort.hpp` | removal of lens distortion from images |
 /// | `stereo.hpp, stereo_frame.hpp` | stereo rigs and their rectification; a pair of stereo images |
 /// | `mono_frame.hpp` | the image of a monocular camera |
-/// | `project_lanes.hpp` | projection of eight points at a time, for optimisers; include it separately |
+/// | `project_lanes.hpp` | projection of eight points at a time, for inner loops; include it separately |
 #pragma once
 
 #include <orbis/camera/any.hpp>

@@ -115,3 +115,27 @@ TEST_CASE("Eight points at a time are projected as one is, for every model and i
   check(camera::kannala_brandt{k, {.k1 = -0.03, .k2 = 0.01, .k3 = -0.02, .k4 = 0.004}});
   check(stretched{});
 }
+
+TEST_CASE("points are projected into arrays, with NaN where there is no pixel") {
+  const camera::radial_tangential model{k, {.k1 = 0.2624, .k2 = -0.9531, .p1 = -0.0054, .p2 = 0.0026, .k3 = 1.1633}};
+  using kernel = camera::projection_kernel<camera::radial_tangential>;
+  std::array<std::array<float, 16>, 3> p{};
+  random_bits random(6);
+  for (std::size_t i = 0; i != 16; ++i) {
+    p[2][i] = i % 5 == 0 ? -1.0F : static_cast<float>(random.uniform(0.5, 5.0));
+    p[0][i] = static_cast<float>(random.uniform(-0.5, 0.5));
+    p[1][i] = static_cast<float>(random.uniform(-0.5, 0.5));
+  }
+  for (const auto level : simd::available_levels()) {
+    std::array<double, 16> u{}, v{};
+    simd::kernel<kernel, kernel::signature>(level)(model, {p[0].data(), p[1].data(), p[2].data()}, 16, u.data(),
+                                                   v.data());
+    for (std::size_t i = 0; i != 16; ++i) {
+      const auto pixel = model.project(vec3(p[0][i], p[1][i], p[2][i]));
+      REQUIRE(pixel.has_value() == (i % 5 != 0));
+      CHECK(std::isnan(u[i]) == !pixel);
+      CHECK(std::isnan(v[i]) == !pixel);
+      if (pixel) CHECK((vec2(u[i], v[i]) - *pixel).norm() < 1e-10);
+    }
+  }
+}

@@ -16,6 +16,8 @@
 #include <orbis/camera/model.hpp>
 #include <orbis/camera/pinhole.hpp>
 #include <orbis/camera/radial_tangential.hpp>
+#include <orbis/core/simd/convert.hpp>
+#include <orbis/core/simd/dispatch.hpp>
 #include <orbis/core/simd/math.hpp>
 
 namespace orbis::camera {
@@ -203,6 +205,30 @@ struct lanes_of<kannala_brandt> {
       out.j[1][0] = k.fy * (across * t);
       out.j[1][1] = k.fy * (scale + (along - scale) * t * t);
       out.j[1][2] = k.fy * (by_z * y);
+    }
+  }
+};
+
+/// A kernel for `simd::kernel` that projects points in the camera frame, up to rounding as `camera.project` does.
+template <camera_model Camera>
+struct projection_kernel {
+  /// Coordinates of `count` points, their number a multiple of eight, in metres; their pixels, NaN without a pixel.
+  using signature = void(const Camera& camera, const std::array<const float*, 3>& axes, std::size_t count, double* u,
+                         double* v);
+
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const Camera& camera, const std::array<const float*, 3>& axes, std::size_t count,
+                                      double* u, double* v) {
+    using lanes = simd::vec<double, 8, Target>;
+    const lanes none(std::numeric_limits<double>::quiet_NaN());
+    for (std::size_t i = 0; i != count; i += 8) {
+      const auto load = [&](const float* axis) ORBIS_INLINE_LAMBDA {
+        return simd::convert<double>(simd::vec<float, 8, Target>::load(axis + i));
+      };
+      lane_projection<lanes> pixel;
+      lanes_of<Camera>::template project<false>(camera, load(axes[0]), load(axes[1]), load(axes[2]), pixel);
+      select(pixel.valid, pixel.u, none).store(u + i);
+      select(pixel.valid, pixel.v, none).store(v + i);
     }
   }
 };

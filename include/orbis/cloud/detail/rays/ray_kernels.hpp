@@ -9,6 +9,7 @@
 #include <cstdint>
 
 #include <orbis/camera/model.hpp>
+#include <orbis/camera/project_lanes.hpp>
 #include <orbis/cloud/detail/rays/depth_windows.hpp>
 #include <orbis/cloud/detail/rays/point_blocks.hpp>
 #include <orbis/cloud/detail/rays/ray_view.hpp>
@@ -57,20 +58,26 @@ using block_axes = std::array<const float*, 3>;
   return out;
 }
 
-/// Projects points into the image of any camera.
+/// Projects points into the image of any camera. `project`: the kernel `camera::projection_kernel`.
 template <camera::camera_model Camera>
-void locate_by(const Camera& camera, const ray_view& view, const block_axes& points, seen_block& seen) {
-  for (std::size_t i = 0; i != seen_block::size; ++i) {
+void locate_by(const Camera& camera, typename camera::projection_kernel<Camera>::signature* project,
+               const ray_view& view, const block_axes& points, seen_block& seen) {
+  constexpr std::size_t size = seen_block::size;
+  std::array<float, size> x, y;
+  std::array<double, size> u, v;
+  for (std::size_t i = 0; i != size; ++i) {
     const auto q = in_camera(view, points[0][i], points[1][i], points[2][i]);
+    x[i] = q[0];
+    y[i] = q[1];
     seen.depth[i] = q[2];
-    seen.pixel[i] = -1;
-    if (!(q[2] > view.min_depth && q[2] <= view.max_depth)) continue;
-    const auto pixel = camera.project(vec3{q[0], q[1], q[2]});
-    if (!pixel) continue;
-    const double u = pixel->x() + 0.5;
-    const double v = pixel->y() + 0.5;
-    if (u >= 0 && u < view.width && v >= 0 && v < view.height)
-      seen.pixel[i] = static_cast<std::int32_t>(v) * view.width + static_cast<std::int32_t>(u);
+  }
+  project(camera, {x.data(), y.data(), seen.depth.data()}, size, u.data(), v.data());
+  for (std::size_t i = 0; i != size; ++i) {
+    const double column = u[i] + 0.5, row = v[i] + 0.5;
+    const bool inside = seen.depth[i] > view.min_depth && seen.depth[i] <= view.max_depth && column >= 0 &&
+                        column < view.width && row >= 0 && row < view.height;
+    seen.pixel[i] =
+        inside ? static_cast<std::int32_t>(row) * view.width + static_cast<std::int32_t>(column) : std::int32_t{-1};
   }
 }
 

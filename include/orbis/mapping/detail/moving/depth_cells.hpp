@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -14,11 +13,12 @@
 
 #include <orbis/camera/depth.hpp>
 #include <orbis/camera/model.hpp>
-#include <orbis/camera/pinhole.hpp>
+#include <orbis/camera/project_lanes.hpp>
 #include <orbis/camera/world_point.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/rounded.hpp>
 #include <orbis/core/se3.hpp>
+#include <orbis/core/simd/dispatch.hpp>
 #include <orbis/core/types.hpp>
 
 namespace orbis::mapping::detail {
@@ -119,19 +119,33 @@ class depth_cells {
   void ask(const Policy& policy, const depth_cells& view, const cell_grid& grid, const Camera& camera,
            const se3& T_view_this, float slant, const Margin& margin, const Visit& visit) const {
     const camera::float_pose pose{T_view_this};
+    using projection = camera::projection_kernel<Camera>;
+    const auto project = simd::kernel<projection, typename projection::signature>();
     for_each_index(policy, static_cast<std::size_t>(grid.down), 8, [&](std::size_t row) {
+      constexpr std::size_t most = 64;
+      std::array<float, most> x{}, y{}, z{};
+      std::array<double, most> u{}, v{};
       const std::size_t end = (row + 1) * static_cast<std::size_t>(grid.across);
-      for (std::size_t i = row * static_cast<std::size_t>(grid.across); i != end; ++i) {
-        if (nearest_[i] == 0.0F) continue;
-        const auto p = camera::world_point(pose, grid.rays[i].x(), grid.rays[i].y(), nearest_[i]);
-        const window* const w = view.window_at(grid, camera, p);
-        if (w == nullptr) continue;
-        const float z = p[2], m = margin(z), before = w->nearest - m - z;
-        if (before > 0.0F) {
-          if (w->covered && before > rounded_product(slant, w->farthest - w->nearest)) visit(i, visibility::through);
-        } else if (z <= w->nearest + m || std::abs(z - w->farthest) <= m ||
-                   (z < w->farthest && w->farthest - w->nearest <= 4.0F * m)) {
-          visit(i, visibility::shown);
+      for (std::size_t begin = row * static_cast<std::size_t>(grid.across), count = 0; begin != end; begin += count) {
+        count = std::min(most, end - begin);
+        for (std::size_t k = 0; k != count; ++k) {
+          const vec2f& ray = grid.rays[begin + k];
+          const auto p = camera::world_point(pose, ray.x(), ray.y(), nearest_[begin + k]);
+          x[k] = p[0], y[k] = p[1], z[k] = p[2];
+        }
+        project(camera, {x.data(), y.data(), z.data()}, (count + 7) / 8 * 8, u.data(), v.data());
+        for (std::size_t k = 0; k != count; ++k) {
+          if (nearest_[begin + k] == 0.0F) continue;
+          const window* const w = view.window_at(grid, static_cast<float>(u[k]), static_cast<float>(v[k]));
+          if (w == nullptr) continue;
+          const float m = margin(z[k]), before = w->nearest - m - z[k];
+          if (before > 0.0F) {
+            if (w->covered && before > rounded_product(slant, w->farthest - w->nearest))
+              visit(begin + k, visibility::through);
+          } else if (z[k] <= w->nearest + m || std::abs(z[k] - w->farthest) <= m ||
+                     (z[k] < w->farthest && w->farthest - w->nearest <= 4.0F * m)) {
+            visit(begin + k, visibility::shown);
+          }
         }
       }
     });
@@ -143,24 +157,8 @@ class depth_cells {
     bool covered = false;                    // true if most of its pixels have a depth
   };
 
-  /// Returns the window around the point's pixel; null if the pixel is outside the image.
-  template <camera::camera_model Camera>
-  [[nodiscard]] const window* window_at(const cell_grid& grid, const Camera& camera,
-                                        const std::array<float, 3>& p) const {
-    if (!(p[2] > 0.0F)) return nullptr;
-    float u = 0.0F, v = 0.0F;
-    if constexpr (std::same_as<Camera, camera::pinhole>) {
-      const auto& k = camera.k();
-      const float inverse = 1.0F / p[2];
-      u = rounded_product(static_cast<float>(k.fx), rounded_product(p[0], inverse)) + static_cast<float>(k.cx);
-      v = rounded_product(static_cast<float>(k.fy), rounded_product(p[1], inverse)) + static_cast<float>(k.cy);
-    } else {
-      const auto pixel =
-          camera.project(vec3{static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])});
-      if (!pixel) return nullptr;
-      u = static_cast<float>(pixel->x());
-      v = static_cast<float>(pixel->y());
-    }
+  /// Returns the window around a pixel; null if the pixel is outside the image or NaN.
+  [[nodiscard]] const window* window_at(const cell_grid& grid, float u, float v) const {
     // Corner i is half a pixel before the centre of pixel i * edge.
     constexpr float per_pixel = 1.0F / cell_grid::edge, first = 0.5F + 0.5F / cell_grid::edge;
     const float x = rounded_product(u, per_pixel) + first, y = rounded_product(v, per_pixel) + first;
