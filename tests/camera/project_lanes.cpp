@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include <orbis/camera/any.hpp>
 #include <orbis/camera/project_lanes.hpp>
 #include <orbis/core/random.hpp>
 #include <orbis/core/simd.hpp>
@@ -114,6 +115,9 @@ TEST_CASE("Eight points at a time are projected as one is, for every model and i
   check(camera::kannala_brandt{k, {}});
   check(camera::kannala_brandt{k, {.k1 = -0.03, .k2 = 0.01, .k3 = -0.02, .k4 = 0.004}});
   check(stretched{});
+  check(camera::any_camera{camera::pinhole{k}});
+  check(camera::any_camera{camera::radial_tangential{k, {.k1 = 0.2624, .k2 = -0.9531, .p1 = -0.0054, .k3 = 1.1633}}});
+  check(camera::any_camera{camera::kannala_brandt{k, {.k1 = -0.03, .k2 = 0.01, .k3 = -0.02, .k4 = 0.004}}});
 }
 
 TEST_CASE("points are projected into arrays, with NaN where there is no pixel") {

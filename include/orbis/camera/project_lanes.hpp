@@ -12,6 +12,7 @@
 #include <limits>
 #include <utility>
 
+#include <orbis/camera/any.hpp>
 #include <orbis/camera/kannala_brandt.hpp>
 #include <orbis/camera/model.hpp>
 #include <orbis/camera/pinhole.hpp>
@@ -206,6 +207,22 @@ struct lanes_of<kannala_brandt> {
       out.j[1][1] = k.fy * (scale + (along - scale) * t * t);
       out.j[1][2] = k.fy * (by_z * y);
     }
+  }
+};
+
+template <>
+struct lanes_of<any_camera> {
+  static constexpr bool axis_aligned = false;
+
+  template <bool Jacobian, double_lanes L>
+  static ORBIS_ALWAYS_INLINE void project(const any_camera& camera, const L& x, const L& y, const L& z,
+                                          lane_projection<L>& out) {
+    if (const auto* const distorted = camera.get_if<radial_tangential>())
+      lanes_of<radial_tangential>::project<Jacobian>(*distorted, x, y, z, out);
+    else if (const auto* const fisheye = camera.get_if<kannala_brandt>())
+      lanes_of<kannala_brandt>::project<Jacobian>(*fisheye, x, y, z, out);
+    else
+      lanes_of<pinhole>::project<Jacobian>(*camera.get_if<pinhole>(), x, y, z, out);
   }
 };
 
