@@ -13,13 +13,18 @@
 ///   9(8), 2000, section III.A.
 /// - a run consists of pixels, with depth or without (0), that equal their prediction.
 /// - a group has one data bit in a run length and two in a difference, because most of these numbers are small.
+///
+/// A row depends on the row above only through ranks, so the decoder computes the ranks of eight rows at the same time,
+/// each two pixels behind the row above it.
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -27,6 +32,10 @@
 #include <orbis/core/bytes.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/core/result.hpp>
+#include <orbis/core/simd/dispatch.hpp>
+#include <orbis/core/simd/mask.hpp>
+#include <orbis/core/simd/shuffle.hpp>
+#include <orbis/core/simd/vec.hpp>
 
 namespace orbis::mapping::detail {
 
@@ -35,16 +44,6 @@ enum class depth_coding : std::uint8_t {
   plain,  ///< two bytes per pixel, little-endian: for images that do not compress
   runs    ///< the number of distinct depths, the steps between them, then alternating runs and differences
 };
-
-/// Predicts the rank of a pixel from the ranks of its neighbours to the west, north and north-west. 0: no depth.
-[[nodiscard]] inline std::int32_t expected_rank(std::int32_t west, std::int32_t north,
-                                                std::int32_t north_west) noexcept {
-  if (west == 0 || north == 0 || north_west == 0) return west != 0 ? west : north;
-  // Uses values, not std::clamp's references, so that the compiler emits no branch, which would be unpredictable.
-  const std::int32_t low = west < north ? west : north, high = west < north ? north : west;
-  const std::int32_t plane = west + north - north_west, above = plane < low ? low : plane;
-  return above < high ? above : high;
-}
 
 /// Zigzag encoding: maps the signed numbers 0, -1, 1, -2 ... to 0, 1, 2, 3 ...
 [[nodiscard]] inline std::uint32_t folded(std::int32_t value) noexcept {
@@ -93,10 +92,51 @@ class group_writer {
   bool full_ = false;
 };
 
+inline constexpr unsigned run_bits = 1, step_bits = 2;
+
+/// A difference and the run that follows it, with the number of bits of both.
+struct step_and_run {
+  std::uint8_t step = 0, run = 0, bits = 0;
+};
+inline constexpr unsigned listed_bits = 10;
+/// The difference and the run at the beginning of each sequence of `listed_bits` bits; `bits` is 0 if they are longer.
+inline constexpr auto steps_and_runs = [] {
+  std::array<step_and_run, std::size_t{1} << listed_bits> out{};
+  for (unsigned sequence = 0; sequence != out.size(); ++sequence) {
+    unsigned left = listed_bits;
+    const auto get = [&](unsigned data_bits) -> std::optional<std::uint8_t> {
+      unsigned value = 0;
+      for (unsigned shift = 0; left > data_bits; shift += data_bits) {
+        left -= data_bits + 1;
+        const unsigned group = sequence >> left;
+        value |= (group & ((1U << data_bits) - 1)) << shift;
+        if ((group >> data_bits & 1U) == 0) return static_cast<std::uint8_t>(value);
+      }
+      return std::nullopt;
+    };
+    const auto step = get(step_bits);
+    const auto run = step ? get(run_bits) : step;
+    if (run) out[sequence] = {*step, *run, static_cast<std::uint8_t>(listed_bits - left)};
+  }
+  return out;
+}();
+
 /// Reads numbers written by a `group_writer`.
 class group_reader {
  public:
   explicit group_reader(std::span<const std::byte> from) noexcept : from_{from} {}
+  /// Returns the next difference and the run that follows it.
+  [[nodiscard]] std::pair<std::uint32_t, std::uint32_t> get_step_and_run() noexcept {
+    if (left_ < listed_bits) fill();
+    const step_and_run listed = steps_and_runs[bits_ >> (64U - listed_bits)];
+    if (listed.bits == 0) {
+      const std::uint32_t step = get<step_bits>();
+      return {step, get<run_bits>()};
+    }
+    bits_ <<= listed.bits;
+    left_ -= listed.bits;
+    return {listed.step, listed.run};
+  }
   /// Returns the next number; bits after the end of the data are 0.
   template <unsigned Bits>
   [[nodiscard]] std::uint32_t get() noexcept {
@@ -133,9 +173,33 @@ class group_reader {
   unsigned left_ = 0;
 };
 
-inline constexpr unsigned run_bits = 1, step_bits = 2;
+/// Predicts the ranks of pixels from the ranks of their neighbours to the west, north and north-west. 0: no depth.
+template <simd::vector V>
+[[nodiscard]] ORBIS_ALWAYS_INLINE V expected_ranks(const V& west, const V& north, const V& north_west) noexcept {
+  const V low = min(west, north), high = max(west, north), zero(0);
+  const auto no_plane = (low == zero) | (north_west == zero);
+  return select(no_plane, select(west == zero, north, west), max(low, min(high, west + north - north_west)));
+}
 
-/// Compresses depth images. Reuses its buffers, which take about 2 bytes per pixel plus 130 kB.
+/// Predicts the ranks of a row from its own ranks and those of the row above.
+struct predict_row {
+  /// Compares `width` ranks with their predictions. All arrays are filled up to a multiple of eight entries, and `here`
+  /// and `above` are preceded by a zero. `expected`: the predictions; `wrong`: a byte for eight of them, bit i of which
+  /// is set if the i-th is wrong.
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE void run(const std::int32_t* here, const std::int32_t* above, std::size_t width,
+                                      std::int32_t* expected, std::uint8_t* wrong) {
+    using lanes = simd::vec<std::int32_t, 8, Target>;
+    for (std::size_t x = 0; x < width; x += 8) {
+      const lanes rank = lanes::load(here + x);
+      const lanes guess = expected_ranks(lanes::load(here + x - 1), lanes::load(above + x), lanes::load(above + x - 1));
+      guess.store(expected + x);
+      wrong[x / 8] = static_cast<std::uint8_t>(simd::bits(rank != guess));
+    }
+  }
+};
+
+/// Compresses depth images. Reuses its buffers, which take about 2 bytes per pixel plus 150 kB.
 class depth_encoder {
  public:
   /// Returns the compressed image, valid until the next call; at most 1 byte longer than the pixels. Linear.
@@ -153,7 +217,8 @@ class depth_encoder {
 
   /// Heap memory in bytes.
   [[nodiscard]] std::size_t bytes() const noexcept {
-    return out_.capacity() + (rank_of_.capacity() + above_.capacity() + here_.capacity()) * sizeof(std::uint16_t);
+    return out_.capacity() + rank_of_.capacity() * sizeof(std::uint16_t) + wrong_.capacity() +
+           (above_.capacity() + here_.capacity() + expected_.capacity()) * sizeof(std::int32_t);
   }
 
  private:
@@ -162,28 +227,31 @@ class depth_encoder {
     out[0] = static_cast<std::byte>(depth_coding::runs);
     group_writer to{out.subspan(1)};
     list_depths(depth, to);
-    above_.assign(static_cast<std::size_t>(depth.width()), 0);
-    here_ = above_;
+    const auto width = static_cast<std::size_t>(depth.width());
+    above_.assign(width + 9, 0);
+    here_ = expected_ = above_;
+    wrong_.assign((width + 7) / 8, 0);
+    const auto predict = simd::kernel<predict_row, void(const std::int32_t*, const std::int32_t*, std::size_t,
+                                                        std::int32_t*, std::uint8_t*)>();
     std::uint32_t run = 0;
-    std::int32_t last = 0;  // value written last
     for (int y = 0; y != depth.height() && !to.is_full(); ++y, above_.swap(here_)) {
-      const std::uint16_t *const from = depth.row(y).data(), *const above = above_.data();
-      std::uint16_t* const here = here_.data();
-      std::int32_t west = 0, north_west = 0;
-      for (int x = 0; x != depth.width(); ++x) {
-        const std::int32_t north = above[x], rank = rank_of_[from[x]];
-        const std::int32_t expected = expected_rank(west, north, north_west);
-        if (rank == expected) {
-          ++run;
-        } else {
-          to.put<run_bits>(std::exchange(run, 0));
+      std::transform(depth.row(y).begin(), depth.row(y).end(), here_.begin() + 1,
+                     [&](std::uint16_t stored) { return std::int32_t{rank_of_[stored]}; });
+      predict(here_.data() + 1, above_.data() + 1, width, expected_.data(), wrong_.data());
+      std::int32_t last = 0;  // rank written last
+      std::size_t begin = 0;
+      if (width % 8 != 0) wrong_.back() &= static_cast<std::uint8_t>((1U << width % 8) - 1);
+      for (std::size_t x = 0; x < width; x += 8)
+        for (std::uint32_t wrong = wrong_[x / 8]; wrong != 0; wrong &= wrong - 1) {
+          const std::size_t at = x + static_cast<std::size_t>(std::countr_zero(wrong));
+          to.put<run_bits>(run + static_cast<std::uint32_t>(at - begin));
+          run = 0;
+          begin = at + 1;
+          const std::int32_t rank = here_[at + 1], expected = expected_[at];
           to.put<step_bits>(rank == 0 ? 0 : folded(rank - (expected != 0 ? expected : last)));
           if (rank != 0) last = rank;
         }
-        here[x] = static_cast<std::uint16_t>(rank);
-        west = rank;
-        north_west = north;
-      }
+      run += static_cast<std::uint32_t>(width - begin);
     }
     to.put<run_bits>(run);
     const std::byte* const end = to.finish();
@@ -218,10 +286,63 @@ class depth_encoder {
 
   std::vector<std::byte> out_;
   std::vector<std::uint16_t> rank_of_;
-  std::vector<std::uint16_t> above_, here_;  // ranks of two rows
+  std::vector<std::int32_t> above_, here_;  // ranks of two rows, after a zero
+  std::vector<std::int32_t> expected_;      // predictions of the ranks of a row
+  std::vector<std::uint8_t> wrong_;         // see predict_row
 };
 
-/// Decompresses depth images. Reuses its buffers: two bytes for each distinct depth, and 4 bytes per column.
+/// Computes the ranks of eight rows. Entry 8 t + i of `entries` belongs to column t - 2 i of row i.
+struct restore_ranks {
+  static constexpr std::size_t rows = 8, lag = 2 * (rows - 1);
+
+  /// Replaces differences by ranks; a difference d is given as 2 d + 1, and 0 marks a pixel that equals its prediction.
+  /// `above`: the ranks of the row above the first one, then `lag` zeros. Returns the largest rank; if the differences
+  /// are invalid, it may exceed the number of ranks.
+  template <simd::target Target>
+  static ORBIS_ALWAYS_INLINE std::uint32_t run(const std::int32_t* above, std::size_t width, std::int32_t* entries) {
+    constexpr std::size_t lanes_per_part = std::min(rows, Target::bytes / sizeof(std::int32_t));
+    using lanes = simd::vec<std::int32_t, lanes_per_part, Target>;
+    using numbers = simd::vec<std::uint32_t, lanes_per_part, Target>;
+    struct part {
+      lanes west{0}, north{0}, before{0}, last{0};  // `before`: the ranks two steps ago
+    };
+    std::array<part, rows / lanes_per_part> parts;
+    numbers largest(0);
+    for (std::size_t t = 0; t != width + lag; ++t) {
+      lanes upper(above[t]);
+      for (std::size_t p = 0; p != parts.size(); ++p) {
+        part& rows_of = parts[p];
+        std::int32_t* const entry = entries + rows * t + lanes_per_part * p;
+        const lanes value = lanes::load(entry), zero(0);
+        const lanes north = shifted_in(rows_of.before, upper, std::make_index_sequence<lanes_per_part - 1>{});
+        const lanes expected = expected_ranks(rows_of.west, north, rows_of.north);
+        const auto is_unknown = expected == zero, is_coded = value != zero;
+        const lanes coded =
+            select((value == lanes(1)) & !is_unknown, zero, select(is_unknown, rows_of.last, expected) + (value >> 1));
+        const lanes rank = select(is_coded, coded, expected);
+        rank.store(entry);
+        largest = max(largest, simd::bits_as<std::uint32_t>(rank));
+        rows_of.last = select(is_coded & (rank != zero), rank, rows_of.last);
+        upper = rows_of.before;
+        rows_of.before = rows_of.west;
+        rows_of.west = rank;
+        rows_of.north = north;
+      }
+    }
+    std::array<std::uint32_t, lanes_per_part> each;
+    largest.store(each.data());
+    return *std::max_element(each.begin(), each.end());
+  }
+
+ private:
+  /// The last lane of `upper`, then all lanes of `lower` but the last.
+  template <class V, std::size_t... I>
+  [[nodiscard]] static ORBIS_ALWAYS_INLINE V shifted_in(const V& lower, const V& upper, std::index_sequence<I...>) {
+    return simd::shuffle<2 * V::count - 1, I...>(lower, upper);
+  }
+};
+
+/// Decompresses depth images. Reuses its buffers: two bytes for each distinct depth, and 36 bytes per column.
 class depth_decoder {
  public:
   /// Decompresses an image into `out`, which must have the size of the image. Error: malformed; the content of `out` is
@@ -269,43 +390,42 @@ class depth_decoder {
   }
 
   [[nodiscard]] result<void> read_runs(group_reader& from, image_view<std::uint16_t> out) {
-    above_.assign(static_cast<std::size_t>(out.width()), 0);
-    here_ = above_;
-    std::uint32_t run = from.get<run_bits>(), last = 0;
-    for (int y = 0; y != out.height(); ++y, above_.swap(here_)) {
-      const std::uint16_t* const above = above_.data();
-      std::uint16_t *const here = here_.data(), *const to = out.row(y).data();
-      std::int32_t west = 0, north_west = 0;
-      for (int x = 0;; ++x) {
-        const auto take = std::min(run, static_cast<std::uint32_t>(out.width() - x));
-        run -= take;
-        for (const int end = x + static_cast<int>(take); x != end; ++x) {
-          const std::int32_t north = above[x];
-          west = expected_rank(west, north, north_west);
-          here[x] = static_cast<std::uint16_t>(west);
-          north_west = north;
+    constexpr std::size_t rows = restore_ranks::rows;
+    const auto restore = simd::kernel<restore_ranks, std::uint32_t(const std::int32_t*, std::size_t, std::int32_t*)>();
+    const auto width = static_cast<std::size_t>(out.width());
+    above_.assign(width + restore_ranks::lag, 0);
+    std::uint32_t run = from.get<run_bits>();
+    for (int y = 0; y < out.height(); y += static_cast<int>(rows)) {
+      const std::size_t count = std::min(rows, static_cast<std::size_t>(out.height() - y));
+      entries_.assign(rows * (width + restore_ranks::lag), 0);
+      for (std::size_t i = 0; i != count; ++i) {
+        std::int32_t* const row = entries_.data() + 2 * rows * i + i;
+        std::size_t x = 0;
+        for (; run < width - x; ++x) {
+          x += run;
+          const auto [step, next_run] = from.get_step_and_run();
+          row[rows * x] = static_cast<std::int32_t>(2 * unfolded(step) + 1);
+          run = next_run;
         }
-        if (x == out.width()) break;
-        const auto expected = static_cast<std::uint32_t>(expected_rank(west, above[x], north_west));
-        const std::uint32_t step = from.get<step_bits>();
-        std::uint32_t rank = 0;
-        if (expected == 0 || step != 0) {
-          rank = last = (expected != 0 ? expected : last) + unfolded(step);
-          if (rank == 0 || rank >= depths_.size()) return damaged("a pixel refers to a depth that is not in the list");
-        }
-        here[x] = static_cast<std::uint16_t>(rank);
-        west = static_cast<std::int32_t>(rank);
-        north_west = above[x];
-        run = from.get<run_bits>();
+        run -= static_cast<std::uint32_t>(width - x);
       }
-      for (int x = 0; x != out.width(); ++x) to[x] = depths_[here[x]];
+      if (restore(above_.data(), width, entries_.data()) >= depths_.size())
+        return damaged("a pixel refers to a depth that is not in the list");
+      for (std::size_t i = 0; i != count; ++i) {
+        const std::int32_t* const row = entries_.data() + 2 * rows * i + i;
+        std::uint16_t* const to = out.row(y + static_cast<int>(i)).data();
+        for (std::size_t x = 0; x != width; ++x) to[x] = depths_[static_cast<std::size_t>(row[rows * x])];
+      }
+      const std::int32_t* const last_row = entries_.data() + 2 * rows * (rows - 1) + rows - 1;
+      for (std::size_t x = 0; x != width; ++x) above_[x] = last_row[rows * x];
     }
     if (run != 0 || !from.is_at_end()) return damaged("has too few or too many bytes for its pixels");
     return {};
   }
 
-  std::vector<std::uint16_t> depths_;        // indexed by rank
-  std::vector<std::uint16_t> above_, here_;  // ranks of two rows
+  std::vector<std::uint16_t> depths_;  // indexed by rank
+  std::vector<std::int32_t> above_;    // ranks of a row
+  std::vector<std::int32_t> entries_;  // see restore_ranks
 };
 
 /// Encodes the zeros of an image: lengths of alternating runs of nonzero and zero pixels, row by row. O(pixels).
