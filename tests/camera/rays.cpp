@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
+#include <initializer_list>
 
 #include <orbis/camera/any.hpp>
 #include <orbis/camera/rays.hpp>
+#include <orbis/core/simd/level.hpp>
 
 #include "support/catch.hpp"
 
@@ -33,4 +35,27 @@ TEST_CASE("pixels without a ray are not a number in the table") {
   CHECK(std::isfinite(rays(30, 50).x()));
   CHECK(ray_table{}.width() == 0);
   CHECK(ray_table{pinhole{}}.width() == 0);
+}
+
+TEST_CASE("the rays of a distorted image are those of its pixels, on every instruction set") {
+  const intrinsics k{157, 120, 90.0, 95.0, 80.0, 57.0};
+  for (const auto& distortion : std::initializer_list<radial_tangential::coefficients>{
+           {},
+           {.k1 = 0.2624, .k2 = -0.9531, .p1 = -0.0054, .p2 = 0.0026, .k3 = 1.1633},
+           {.k1 = -0.4},  // no rays at the edge
+           {.k1 = 0.3, .k2 = 0.1, .p1 = 0.001, .p2 = -0.002, .k3 = 0.01, .k4 = 0.5, .k5 = 0.2, .k6 = 0.03}})
+    for (const simd::level level : simd::available_levels()) {
+      const simd::level_limit limit{level};
+      const radial_tangential c{k, distortion};
+      int pixels = 0, without_ray = 0, different = 0;
+      for_each_ray(any_camera{c}, [&](int x, int y, const vec2& ray) {
+        const auto expected = c.unproject(vec2{x, y});
+        different += expected ? ray != vec2{expected->head<2>()} : !std::isnan(ray.x());
+        without_ray += expected ? 0 : 1;
+        ++pixels;
+      });
+      CHECK(pixels == 157 * 120);
+      CHECK(different == 0);
+      CHECK((without_ray != 0) == (distortion.k1 < 0.0));
+    }
 }

@@ -21,6 +21,10 @@
 
 namespace orbis::camera {
 
+namespace detail {
+struct unproject_eight;
+}
+
 /// The radial-tangential model. With `x, y` on the plane z = 1 and `s = x^2 + y^2`:
 /// `g = (1 + k1 s + k2 s^2 + k3 s^3) / (1 + k4 s + k5 s^2 + k6 s^3)`,
 /// `x' = g x + 2 p1 x y + p2 (s + 2 x^2)`, `y' = g y + p1 (s + 2 y^2) + 2 p2 x y`.
@@ -85,6 +89,7 @@ class radial_tangential {
   friend bool operator==(const radial_tangential&, const radial_tangential&) = default;
 
  private:
+  friend struct detail::unproject_eight;
   static constexpr int max_iterations = 30;
   /// Threshold on the squared relative step. The remaining error is about the square of the last step.
   static constexpr double converged = 1e-20;

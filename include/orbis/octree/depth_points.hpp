@@ -16,6 +16,7 @@
 #include <orbis/camera/depth.hpp>
 #include <orbis/camera/model.hpp>
 #include <orbis/camera/pinhole.hpp>
+#include <orbis/camera/rays.hpp>
 #include <orbis/camera/world_point.hpp>
 #include <orbis/core/se3.hpp>
 
@@ -88,14 +89,11 @@ class pixel_rays {
     const auto size = static_cast<std::size_t>(row(height_)) + padding;
     x_.assign(size, 0.0F);
     y_.assign(size, 0.0F);
-    for (int v = 0; v != height_; ++v)
-      for (int u = 0; u != width_; ++u) {
-        const auto ray = camera.unproject(vec2{static_cast<double>(u), static_cast<double>(v)});
-        constexpr float none = std::numeric_limits<float>::quiet_NaN();
-        const auto i = static_cast<std::size_t>(row(v) + u);
-        x_[i] = ray ? static_cast<float>(ray->x()) : none;
-        y_[i] = ray ? static_cast<float>(ray->y()) : none;
-      }
+    camera::for_each_ray(camera, [&](int u, int v, const vec2& ray) {
+      const auto i = static_cast<std::size_t>(row(v) + u);
+      x_[i] = static_cast<float>(ray.x());
+      y_[i] = static_cast<float>(ray.y());
+    });
   }
 
   std::vector<float> x_, y_;
