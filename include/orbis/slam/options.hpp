@@ -259,8 +259,9 @@ struct options {
   moving_options moving{};
   thread_options threads{};
   /// Maximum total number of frames in the trajectories of all maps: the latest tracked frames are kept. Intended for
-  /// robots that run for days; a frame takes 72 bytes. If limited, the active map forgets the poses of erased keyframes
-  /// that none of these frames refers to, except the latest ones (`basic_map::remembers`).
+  /// robots that run for days; a frame takes 72 bytes. Below 100, the first frames of a map are not localised again. If
+  /// limited, the active map forgets the poses of erased keyframes that none of these frames refers to, except the
+  /// latest ones (`basic_map::remembers`).
   std::size_t trajectory_frames = std::numeric_limits<std::size_t>::max();
   bool localization_only = false;     ///< creates no keyframes and keeps the map unchanged: for a loaded map
   std::optional<se3> initial_pose{};  ///< `T_world_camera` of the first frame of a map; default: the identity

@@ -46,7 +46,7 @@ class young_frames {
   /// Starts to keep the frames of a new map.
   void begin_map(map_id map) {
     waiting_.clear();
-    count_ = 0;
+    count_ = options_.trajectory_frames < most ? most : 0;  // a shorter trajectory soon forgets these frames
     map_ = map;
   }
   /// Forgets the waiting frames: the shutter has changed, and the next keyframes are made with the new one.
