@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// A decoder for the PNG files of depth cameras, based on libdeflate: it takes half the time of libpng and gives the
-/// same pixels. All other files, including damaged ones, are left to libpng. This header is empty unless
+/// A decoder for the PNG files of depth cameras, based on libdeflate: it takes a third of the time of libpng and gives
+/// the same pixels. All other files, including damaged ones, are left to libpng. This header is empty unless
 /// ORBIS_LIBDEFLATE is defined, which orbis::compiled does for itself if CMake finds libdeflate.
 ///
 /// "Portable Network Graphics (PNG) Specification", second edition, W3C 2003: chunks (5), filters (9).
@@ -67,45 +67,15 @@ template <class = void>
   }
 }
 
-/// Reverses the filters of 16-bit grey pixels. A filter predicts a byte from bytes to the left and above, so the pixels
-/// of a row depend on each other: eight rows are decoded at the same time, each two pixels behind the row above it.
+/// Reverses filters. A filter predicts a byte from bytes to the left and above, so the pixels of a row depend on each
+/// other: eight rows are decoded at the same time, each two pixels behind the row above it.
 class depth_unfilter {
  public:
-  /// @param raw  for each row of `out`: a filter from 0 to 4, then the filtered bytes
-  depth_unfilter(const unsigned char* raw, image<std::uint16_t>& out) : raw_{raw}, out_{out} {
-    for (int y = 0; y < out.height(); y += rows) decode(y);
-  }
+  static constexpr int rows = 8;  ///< number of rows that are decoded at the same time
 
- private:
-  static constexpr int rows = 8, lag = 2 * (rows - 1);
-  using bytes = simd::vec<std::int16_t, 8, simd::portable>;    // of one pixel in each of four rows
-  using pixels = simd::vec<std::uint32_t, 4, simd::portable>;  // the same: first byte + 2^16 * second byte
+  depth_unfilter(const unsigned char* raw, image<std::uint16_t>& out) : raw_{raw}, out_{out} {}
 
-  /// Four rows. The pixel above the next one of a row is `before` of the row above, two steps ago.
-  struct group {
-    bytes is_left, is_above, is_mean, is_paeth;  // masks of rows by their filter
-    bytes left{0}, corner{0}, before{0};
-
-    [[nodiscard]] ORBIS_ALWAYS_INLINE pixels step(std::uint64_t filtered, const pixels& row_above) noexcept {
-      simd::vec<std::uint8_t, 8, simd::portable> packed;
-      std::memcpy(&packed, &filtered, sizeof packed);
-      const bytes above =
-          simd::bits_as<std::int16_t>(simd::shuffle<7, 0, 1, 2>(simd::bits_as<std::uint32_t>(before), row_above));
-      const bytes to_left = above - corner, to_above = left - corner, to_corner = to_left + to_above;
-      const bytes of_left = max(to_left, 0 - to_left), of_above = max(to_above, 0 - to_above);
-      const bytes nearest = min(max(to_corner, 0 - to_corner), min(of_above, of_left));
-      const bytes paeth = select(of_left == nearest, left, select(of_above == nearest, above, corner));
-      const bytes predicted =
-          (paeth & is_paeth) | ((left & is_left) | (above & is_above) | (((left + above) >> 1) & is_mean));
-      before = left;
-      corner = above;
-      left = simd::bits_as<std::int16_t>(simd::bits_as<std::uint8_t>(simd::convert<std::int16_t>(packed)) +
-                                         simd::bits_as<std::uint8_t>(predicted));
-      const pixels both = simd::bits_as<std::uint32_t>(left);
-      return (both << 8) | (both >> 16);  // the pixel is in the lower 16 bits
-    }
-  };
-
+  /// Decodes the rows from `y` on, at most `rows`. @pre the rows above are decoded
   void decode(int y) {
     const int width = out_.width(), last = std::min(rows, out_.height() - y) - 1;
     std::array<const unsigned char*, rows> from;
@@ -164,15 +134,56 @@ class depth_unfilter {
         step(t, get_inside, put_inside);
   }
 
+ private:
+  static constexpr int lag = 2 * (rows - 1);
+  using bytes = simd::vec<std::int16_t, 8, simd::portable>;    // of one pixel in each of four rows
+  using pixels = simd::vec<std::uint32_t, 4, simd::portable>;  // the same: first byte + 2^16 * second byte
+
+  /// Four rows. The pixel above the next one of a row is `before` of the row above, two steps ago.
+  struct group {
+    bytes is_left, is_above, is_mean, is_paeth;  // masks of rows by their filter
+    bytes left{0}, corner{0}, before{0};
+
+    [[nodiscard]] ORBIS_ALWAYS_INLINE pixels step(std::uint64_t filtered, const pixels& row_above) noexcept {
+      simd::vec<std::uint8_t, 8, simd::portable> packed;
+      std::memcpy(&packed, &filtered, sizeof packed);
+      const bytes above =
+          simd::bits_as<std::int16_t>(simd::shuffle<7, 0, 1, 2>(simd::bits_as<std::uint32_t>(before), row_above));
+      const bytes to_left = above - corner, to_above = left - corner, to_corner = to_left + to_above;
+      const bytes of_left = max(to_left, 0 - to_left), of_above = max(to_above, 0 - to_above);
+      const bytes nearest = min(max(to_corner, 0 - to_corner), min(of_above, of_left));
+      const bytes paeth = select(of_left == nearest, left, select(of_above == nearest, above, corner));
+      const bytes predicted =
+          (paeth & is_paeth) | ((left & is_left) | (above & is_above) | (((left + above) >> 1) & is_mean));
+      before = left;
+      corner = above;
+      left = simd::bits_as<std::int16_t>(simd::bits_as<std::uint8_t>(simd::convert<std::int16_t>(packed)) +
+                                         simd::bits_as<std::uint8_t>(predicted));
+      const pixels both = simd::bits_as<std::uint32_t>(left);
+      return (both << 8) | (both >> 16);  // the pixel is in the lower 16 bits
+    }
+  };
+
+  /// Decodes `rows` rows from row y on, as far as they exist. @pre the rows above are decoded
   const unsigned char* raw_;
   image<std::uint16_t>& out_;
 };
 
-/// Decodes a non-interlaced 16-bit grey PNG file in half the time of libpng. Empty for all other files and damaged
-/// files, which libpng decodes or reports. Allocates a copy of the compressed pixels, the decompressed bytes (at most
-/// 1032 times the compressed size), and the image, which is smaller than the decompressed bytes.
+/// Reverses the filters of 16-bit grey pixels. `raw`: for each row of `out`, a filter from 0 to 4 and the filtered
+/// bytes.
+/// @pre the processor is little-endian
+template <class = void>
+void unfilter_depth(const unsigned char* raw, image<std::uint16_t>& out) {
+  depth_unfilter rows{raw, out};
+  for (int y = 0; y < out.height(); y += depth_unfilter::rows) rows.decode(y);
+}
+
+/// Decodes a non-interlaced 16-bit grey PNG file in a third of the time of libpng. Empty for all other files and
+/// damaged files, which libpng decodes or reports. Allocates a copy of the compressed pixels, the decompressed bytes
+/// (at most 1032 times the compressed size), and the image, which is smaller than the decompressed bytes.
 template <class = void>
 [[nodiscard]] std::optional<image<std::uint16_t>> decode_plain_depth(std::string_view bytes) {
+  if constexpr (std::endian::native != std::endian::little) return std::nullopt;  // as unfilter_depth requires
   const auto packed = read_depth_chunks(bytes);
   if (!packed) return std::nullopt;
   const std::uint64_t row_bytes = 2 * std::uint64_t{packed->width} + 1, raw_bytes = row_bytes * packed->height;
@@ -189,7 +200,7 @@ template <class = void>
   for (std::uint64_t at = 0; at != raw_bytes; at += row_bytes)
     if (raw[at] > 4) return std::nullopt;
   image<std::uint16_t> out(static_cast<int>(packed->width), static_cast<int>(packed->height));
-  depth_unfilter(raw.get(), out);
+  unfilter_depth(raw.get(), out);
   return out;
 }
 
