@@ -87,6 +87,19 @@ TEST_CASE("numbers come back from groups of bits, and what is missing or left ov
   check_groups<2>();
 }
 
+TEST_CASE("a difference and the run after it are read as one after the other") {
+  orbis::random_bits random{11};
+  std::vector<std::byte> bytes(400);
+  for (auto& b : bytes) b = static_cast<std::byte>(random.below(4) == 0 ? random.below(256) : random.below(40));
+  group_reader together{bytes}, apart{bytes};
+  for (int i = 0; i != 1000; ++i) {  // also behind the end
+    const auto [step, run] = together.get_step_and_run();
+    REQUIRE(step == apart.get<2>());
+    REQUIRE(run == apart.get<1>());
+    REQUIRE(together.is_at_end() == apart.is_at_end());
+  }
+}
+
 TEST_CASE("differences of ranks come back from folding") {
   for (std::int32_t value = -65535; value <= 65535; ++value)
     if (static_cast<std::int32_t>(unfolded(folded(value))) != value || folded(value) > 131070) FAIL("value " << value);

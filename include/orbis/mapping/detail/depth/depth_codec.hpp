@@ -12,6 +12,9 @@
 ///   Seroussi, G. Sapiro, "The LOCO-I lossless image compression algorithm", IEEE Transactions on Image Processing
 ///   9(8), 2000, section III.A.
 /// - a run consists of pixels, with depth or without (0), that equal their prediction.
+/// - a difference is relative to the prediction or, if that is 0, to the last nonzero rank that was coded in the row.
+/// The
+///   difference 0 to a prediction with depth means a pixel without depth.
 /// - a group has one data bit in a run length and two in a difference, because most of these numbers are small.
 ///
 /// A row depends on the row above only through ranks, so the decoder computes the ranks of eight rows at the same time,
@@ -185,7 +188,7 @@ template <simd::vector V>
 struct predict_row {
   /// Compares `width` ranks with their predictions. All arrays are filled up to a multiple of eight entries, and `here`
   /// and `above` are preceded by a zero. `expected`: the predictions; `wrong`: a byte for eight of them, bit i of which
-  /// is set if the i-th is wrong.
+  /// is set if the i-th is wrong; bits of pixels after the row are unspecified.
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const std::int32_t* here, const std::int32_t* above, std::size_t width,
                                       std::int32_t* expected, std::uint8_t* wrong) {
@@ -238,7 +241,7 @@ class depth_encoder {
       std::transform(depth.row(y).begin(), depth.row(y).end(), here_.begin() + 1,
                      [&](std::uint16_t stored) { return std::int32_t{rank_of_[stored]}; });
       predict(here_.data() + 1, above_.data() + 1, width, expected_.data(), wrong_.data());
-      std::int32_t last = 0;  // rank written last
+      std::int32_t last = 0;  // last nonzero rank written in this row
       std::size_t begin = 0;
       if (width % 8 != 0) wrong_.back() &= static_cast<std::uint8_t>((1U << width % 8) - 1);
       for (std::size_t x = 0; x < width; x += 8)
@@ -295,9 +298,9 @@ class depth_encoder {
 struct restore_ranks {
   static constexpr std::size_t rows = 8, lag = 2 * (rows - 1);
 
-  /// Replaces differences by ranks; a difference d is given as 2 d + 1, and 0 marks a pixel that equals its prediction.
-  /// `above`: the ranks of the row above the first one, then `lag` zeros. Returns the largest rank; if the differences
-  /// are invalid, it may exceed the number of ranks.
+  /// Replaces differences by ranks in `8 (width + lag)` entries; a difference d is given as 2 d + 1, and 0 marks a
+  /// pixel that equals its prediction. `above`: the ranks of the row above the first one, then `lag` zeros. Returns the
+  /// largest rank; it is too large if a difference is invalid.
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE std::uint32_t run(const std::int32_t* above, std::size_t width, std::int32_t* entries) {
     constexpr std::size_t lanes_per_part = std::min(rows, Target::bytes / sizeof(std::int32_t));
@@ -317,11 +320,12 @@ struct restore_ranks {
         const lanes north = shifted_in(rows_of.before, upper, std::make_index_sequence<lanes_per_part - 1>{});
         const lanes expected = expected_ranks(rows_of.west, north, rows_of.north);
         const auto is_unknown = expected == zero, is_coded = value != zero;
-        const lanes coded =
-            select((value == lanes(1)) & !is_unknown, zero, select(is_unknown, rows_of.last, expected) + (value >> 1));
+        const auto is_hole = (value == lanes(1)) & !is_unknown;
+        const lanes coded = select(is_hole, zero, select(is_unknown, rows_of.last, expected) + (value >> 1));
         const lanes rank = select(is_coded, coded, expected);
         rank.store(entry);
-        largest = max(largest, simd::bits_as<std::uint32_t>(rank));
+        const auto is_wrong = is_coded & (coded == zero) & !is_hole;  // the encoder writes no such difference
+        largest = max(largest, simd::bits_as<std::uint32_t>(select(is_wrong, lanes(-1), rank)));
         rows_of.last = select(is_coded & (rank != zero), rank, rows_of.last);
         upper = rows_of.before;
         rows_of.before = rows_of.west;
