@@ -46,7 +46,7 @@ shutter_results find_shutter(const frame_source& source, const settings& s, doub
   set_profile(s.profile, options);
   options.estimates_shutter = true;
   options.features.max_features = std::min(options.features.max_features, 500);  // enough for an estimate
-  options.trajectory_frames = 2;
+  options.trajectory_frames = 2;  // nothing reads the trajectory, so no frame is localised again
   orbis::slam::rgbd_system<decltype(orbis::camera::camera_settings::model)> slam{source.camera.model, options};
   read_ahead frames{source, s.threads != 1};
   std::optional<double> begin;

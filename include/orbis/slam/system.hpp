@@ -156,8 +156,8 @@ class system {
   void stop() noexcept;
 
   /// Returns the poses of the frames that were tracked in the active map: all, or those within
-  /// `options::trajectory_frames`. The poses follow later corrections of the keyframes, and the first 100 frames of a
-  /// map are localised again after five more keyframes. O(frames).
+  /// `options::trajectory_frames`. The poses follow later corrections of the keyframes. Unless fewer than 100 frames
+  /// are kept, the first 100 frames of a map are localised again after five more keyframes. O(frames).
   [[nodiscard]] orbis::trajectory trajectory() const;
   /// As above, for another map; empty if that map does not exist or none of its frames is left.
   [[nodiscard]] orbis::trajectory trajectory(map_id map) const;

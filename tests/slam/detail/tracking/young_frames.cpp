@@ -16,6 +16,8 @@ TEST_CASE("The first frames of a map are localised again in the map that later k
   const io::synthetic_recording frames{o};
   slam::options settings;
   settings.estimates_shutter = GENERATE(false, true);  // it is global
+  const bool is_short = !settings.estimates_shutter && GENERATE(false, true);
+  if (is_short) settings.trajectory_frames = 99;  // too short for a second localisation
   settings.initial_pose = frames.T_world_camera(0);
   test::slam_system slam{frames.camera().model, settings};
   trajectory tracked, again;
@@ -29,6 +31,6 @@ TEST_CASE("The first frames of a map are localised again in the map that later k
   // Without the second localisation, corrections of keyframes improve these by 3 %.
   const double error_tracked = eval::rpe(tracked, frames.ground_truth())->translation.rmse;
   const double error_again = eval::rpe(again, frames.ground_truth())->translation.rmse;
-  CAPTURE(settings.estimates_shutter, error_tracked, error_again);
-  CHECK(error_again < 0.92 * error_tracked);
+  CAPTURE(settings.estimates_shutter, is_short, error_tracked, error_again);
+  CHECK((error_again < 0.92 * error_tracked) == !is_short);
 }

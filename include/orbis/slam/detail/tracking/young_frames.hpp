@@ -32,7 +32,8 @@ namespace orbis::slam::detail {
 
 /// Keeps the first frames of a map. A new map has few landmarks, and keyframes that have not yet been adjusted with
 /// later ones; the frames between these keyframes would keep their initial pose errors in the trajectory. They are
-/// therefore localised again after several more keyframes, using the motion between their neighbours.
+/// therefore localised again after several more keyframes, using the motion between their neighbours. If the trajectory
+/// is limited to fewer frames than are kept here, none is kept.
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
 class young_frames {
  public:
@@ -46,7 +47,7 @@ class young_frames {
   /// Starts to keep the frames of a new map.
   void begin_map(map_id map) {
     waiting_.clear();
-    count_ = options_.trajectory_frames < most ? most : 0;  // a shorter trajectory soon forgets these frames
+    count_ = options_.trajectory_frames < most ? most : 0;  // the trajectory may forget them first
     map_ = map;
   }
   /// Forgets the waiting frames: the shutter has changed, and the next keyframes are made with the new one.
