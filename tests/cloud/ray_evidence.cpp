@@ -209,7 +209,10 @@ TEST_CASE("ray evidence through any lens") {
     std::size_t through = 0;
     for (const auto& e : wanted) through += e.through;
     CHECK(through > 200);
-    CHECK(ray_evidence_scores(orbis::seq, points, views, camera, options) == wanted);
+    for (const auto level : orbis::simd::available_levels()) {
+      const orbis::simd::level_limit limit{level};
+      CHECK(ray_evidence_scores(orbis::seq, points, views, camera, options) == wanted);
+    }
     CHECK(ray_evidence_scores(orbis::par.with(3), points, views, camera, options) == wanted);
     CHECK(ray_evidence_scores(orbis::par.with(3), points, views, orbis::camera::any_camera{camera}, options) == wanted);
   };

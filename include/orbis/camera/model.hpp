@@ -36,7 +36,7 @@ concept unprojects = requires(const C& camera, const vec2& pixel) {
 /// integers.
 ///
 /// - `project(p)`: the pixel of a point in the camera frame, empty if there is none (behind the camera, outside the
-/// model's domain). Does not check the image bounds.
+/// model's domain, a NaN). Accepts any point; does not check the image bounds.
 /// - `project(p, J)`: the pixel, and its derivative with respect to the point (2x3).
 /// - `unproject(pixel)`: the ray through a pixel, scaled to z = 1, empty if the inversion fails.
 template <class C>

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 /// @file
-/// Projects eight points at a time, in vectors of doubles (`core/simd/vec.hpp`): the inner loop of optimisers.
+/// Projects eight points at a time, in vectors of doubles (`core/simd/vec.hpp`): for inner loops.
 ///
 /// `lanes_of<Camera>` exists for every camera model. The library's models have specialisations that give the same bits
 /// on every instruction set; any other model uses eight calls to `project`.
 #pragma once
 
 #include <array>
+#include <cassert>
 #include <concepts>
 #include <cstddef>
 #include <limits>
@@ -20,6 +21,8 @@
 #include <orbis/core/simd/convert.hpp>
 #include <orbis/core/simd/dispatch.hpp>
 #include <orbis/core/simd/math.hpp>
+#include <orbis/core/simd/vec.hpp>
+#include <orbis/core/types.hpp>
 
 namespace orbis::camera {
 
@@ -221,7 +224,7 @@ struct lanes_of<any_camera> {
       lanes_of<radial_tangential>::project<Jacobian>(*distorted, x, y, z, out);
     else if (const auto* const fisheye = camera.get_if<kannala_brandt>())
       lanes_of<kannala_brandt>::project<Jacobian>(*fisheye, x, y, z, out);
-    else
+    else  // a model that is added to any_camera needs a branch here
       lanes_of<pinhole>::project<Jacobian>(*camera.get_if<pinhole>(), x, y, z, out);
   }
 };
@@ -229,7 +232,8 @@ struct lanes_of<any_camera> {
 /// A kernel for `simd::kernel` that projects points in the camera frame, up to rounding as `camera.project` does.
 template <camera_model Camera>
 struct projection_kernel {
-  /// Coordinates of `count` points, their number a multiple of eight, in metres; their pixels, NaN without a pixel.
+  /// `axes`: x, y and z of `count` points in the camera frame, metres. `u` and `v`: their pixels, NaN where there is
+  /// none. @pre count % 8 == 0
   using signature = void(const Camera& camera, const std::array<const float*, 3>& axes, std::size_t count, double* u,
                          double* v);
 
@@ -238,7 +242,8 @@ struct projection_kernel {
                                       double* u, double* v) {
     using lanes = simd::vec<double, 8, Target>;
     const lanes none(std::numeric_limits<double>::quiet_NaN());
-    for (std::size_t i = 0; i != count; i += 8) {
+    assert(count % 8 == 0);
+    for (std::size_t i = 0; i < count; i += 8) {
       const auto load = [&](const float* axis) ORBIS_INLINE_LAMBDA {
         return simd::convert<double>(simd::vec<float, 8, Target>::load(axis + i));
       };

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <limits>
@@ -19,8 +20,8 @@
 
 namespace orbis::camera {
 
-/// Calls `use(x, y, ray)` for every pixel, row by row; `ray`, a `vec2`: x and y of the pixel's ray at z = 1, as
-/// `camera.unproject` returns it; NaN if there is none. O(pixels).
+/// Calls `use(x, y, ray)` for every pixel, row by row; `ray`, a `vec2`: x and y of the pixel's ray at z = 1, up to
+/// rounding as `camera.unproject` returns it; NaN if there is none. O(pixels).
 template <camera_model Camera, class Use>
 void for_each_ray(const Camera& camera, const Use& use) {
   if constexpr (std::same_as<Camera, any_camera>) {
@@ -30,16 +31,18 @@ void for_each_ray(const Camera& camera, const Use& use) {
       const auto ray = camera.unproject(vec2{x, y});
       return ray ? vec2{ray->x(), ray->y()} : filled<vec2>(std::numeric_limits<double>::quiet_NaN());
     };
+    using signature = void(const radial_tangential&, int, int, double*, double*);
+    [[maybe_unused]] signature* unproject = nullptr;
+    if constexpr (std::same_as<Camera, radial_tangential>)
+      unproject = simd::kernel<detail::unproject_eight, signature>();
     for (int y = 0; y != camera.height(); ++y) {
       if constexpr (std::same_as<Camera, radial_tangential>) {
-        const auto unproject =
-            simd::kernel<detail::unproject_eight, void(const radial_tangential&, int, int, double*, double*)>();
         std::array<double, 8> u, v;
         for (int first = 0; first < camera.width(); first += 8) {
           unproject(camera, first, y, u.data(), v.data());
           for (int x = first; x != std::min(first + 8, camera.width()); ++x) {
             const auto i = static_cast<std::size_t>(x - first);
-            use(x, y, u[i] == u[i] ? vec2{u[i], v[i]} : ray_of(x, y));
+            use(x, y, std::isnan(u[i]) ? ray_of(x, y) : vec2{u[i], v[i]});
           }
         }
       } else {

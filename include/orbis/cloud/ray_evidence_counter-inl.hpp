@@ -184,8 +184,6 @@ template <camera::camera_model Camera>
 template <execution_policy Policy, class F>
 void ray_evidence_counter<Camera>::for_each_seen_block(const Policy& policy, const detail::ray_view& view, F&& f) {
   const detail::ray_kernels kernels;
-  using projection = camera::projection_kernel<Camera>;
-  [[maybe_unused]] const auto project = simd::kernel<projection, typename projection::signature>();
   for_each_index(policy, blocks_.groups.size(), 2, [&](std::size_t group) {
     if (test_.says_nothing(blocks_.groups[group])) return;
     const std::size_t begin = group * detail::point_blocks::group_size;
@@ -198,7 +196,7 @@ void ray_evidence_counter<Camera>::for_each_seen_block(const Policy& policy, con
       if constexpr (std::same_as<Camera, camera::pinhole>) {
         kernels.locate(view, points, seen);
       } else {
-        detail::locate_by(camera_, project, view, points, seen);
+        detail::locate_by(camera_, view, points, seen);
       }
       detail::block_verdict verdict;
       kernels.judge(view, seen, verdict);

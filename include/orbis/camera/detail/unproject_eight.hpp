@@ -13,8 +13,8 @@
 
 namespace orbis::camera::detail {
 
-/// `radial_tangential::unproject` for eight pixels of a row, with the same bits: Newton's method from the distorted
-/// position. NaN where that fails.
+/// `radial_tangential::unproject` for eight pixels of a row: Newton's method from the distorted position. NaN where
+/// that fails. The bits are those of `unproject`, unless the compiler fuses products with sums there.
 struct unproject_eight {
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE void run(const radial_tangential& camera, int first, int row, double* x_of, double* y_of) {

@@ -15,7 +15,6 @@
 #include <orbis/cloud/detail/rays/ray_view.hpp>
 #include <orbis/core/rounded.hpp>
 #include <orbis/core/simd.hpp>
-#include <orbis/core/types.hpp>
 
 namespace orbis::cloud::detail {
 
@@ -58,10 +57,11 @@ using block_axes = std::array<const float*, 3>;
   return out;
 }
 
-/// Projects points into the image of any camera. `project`: the kernel `camera::projection_kernel`.
+/// Projects points into the image of any camera.
 template <camera::camera_model Camera>
-void locate_by(const Camera& camera, typename camera::projection_kernel<Camera>::signature* project,
-               const ray_view& view, const block_axes& points, seen_block& seen) {
+void locate_by(const Camera& camera, const ray_view& view, const block_axes& points, seen_block& seen) {
+  using projection = camera::projection_kernel<Camera>;
+  const auto project = simd::kernel<projection, typename projection::signature>();
   constexpr std::size_t size = seen_block::size;
   std::array<float, size> x, y;
   std::array<double, size> u, v;
