@@ -32,10 +32,11 @@
 
 namespace orbis::io::detail {
 
-/// Size of a non-interlaced 16-bit grey image, and its compressed pixels.
+/// Size of a non-interlaced 16-bit grey image, and its compressed pixels, in one or more parts of the file.
 struct packed_depth {
   std::uint32_t width = 0, height = 0;
-  std::vector<char> pixels;
+  std::vector<std::string_view> parts;
+  std::size_t size = 0;  ///< total size of the parts
 };
 
 /// Reads the chunks of such a PNG file; empty for any other file and for a damaged one. O(bytes).
@@ -56,8 +57,9 @@ template <class = void>
       out.height = number(data.substr(4));
       // 16 bits, grey, deflate, adaptive filtering, not interlaced
       if (data.substr(8) != "\x10\0\0\0\0"sv || out.width == 0 || out.height == 0) return std::nullopt;
-    } else if (type == "IDAT" && (was_pixels || out.pixels.empty())) {
-      out.pixels.insert(out.pixels.end(), data.begin(), data.end());
+    } else if (type == "IDAT" && (was_pixels || out.parts.empty())) {
+      out.parts.push_back(data);
+      out.size += data.size();
     } else if (type == "IEND") {
       return out;
     } else if ((type[0] & 0x20) == 0) {  // an unexpected critical chunk
@@ -189,13 +191,17 @@ template <class = void>
   const std::uint64_t row_bytes = 2 * std::uint64_t{packed->width} + 1, raw_bytes = row_bytes * packed->height;
   if (packed->width > max_png_side || packed->height > max_png_side ||
       std::uint64_t{packed->width} * packed->height > max_image_pixels ||
-      raw_bytes > 1032 * std::uint64_t{packed->pixels.size()})
+      raw_bytes > 1032 * std::uint64_t{packed->size})
     return std::nullopt;
   const std::unique_ptr<libdeflate_decompressor, void (*)(libdeflate_decompressor*)> inflate{
       libdeflate_alloc_decompressor(), libdeflate_free_decompressor};
-  const auto raw = std::make_unique_for_overwrite<unsigned char[]>(raw_bytes);
-  if (!inflate || libdeflate_zlib_decompress(inflate.get(), packed->pixels.data(), packed->pixels.size(), raw.get(),
-                                             raw_bytes, nullptr) != LIBDEFLATE_SUCCESS)
+  // One block for both: glibc returns several large blocks to the system when they are freed, and clearing new pages
+  // for each image takes longer than decoding it.
+  const auto raw = std::make_unique_for_overwrite<unsigned char[]>(raw_bytes + packed->size);
+  unsigned char* end = raw.get() + raw_bytes;
+  for (const std::string_view part : packed->parts) end = std::copy(part.begin(), part.end(), end);
+  if (!inflate || libdeflate_zlib_decompress(inflate.get(), raw.get() + raw_bytes, packed->size, raw.get(), raw_bytes,
+                                             nullptr) != LIBDEFLATE_SUCCESS)
     return std::nullopt;
   for (std::uint64_t at = 0; at != raw_bytes; at += row_bytes)
     if (raw[at] > 4) return std::nullopt;
