@@ -24,31 +24,27 @@ namespace orbis::camera {
 /// rounding as `camera.unproject` returns it; NaN if there is none. O(pixels).
 template <camera_model Camera, class Use>
 void for_each_ray(const Camera& camera, const Use& use) {
+  [[maybe_unused]] const auto ray_of = [&](int x, int y) {
+    const auto ray = camera.unproject(vec2{x, y});
+    return ray ? vec2{ray->x(), ray->y()} : filled<vec2>(std::numeric_limits<double>::quiet_NaN());
+  };
   if constexpr (std::same_as<Camera, any_camera>) {
     camera.visit([&](const auto& model) { for_each_ray(model, use); });
-  } else {
-    const auto ray_of = [&](int x, int y) {
-      const auto ray = camera.unproject(vec2{x, y});
-      return ray ? vec2{ray->x(), ray->y()} : filled<vec2>(std::numeric_limits<double>::quiet_NaN());
-    };
-    using signature = void(const radial_tangential&, int, int, double*, double*);
-    [[maybe_unused]] signature* unproject = nullptr;
-    if constexpr (std::same_as<Camera, radial_tangential>)
-      unproject = simd::kernel<detail::unproject_eight, signature>();
-    for (int y = 0; y != camera.height(); ++y) {
-      if constexpr (std::same_as<Camera, radial_tangential>) {
-        std::array<double, 8> u, v;
-        for (int first = 0; first < camera.width(); first += 8) {
-          unproject(camera, first, y, u.data(), v.data());
-          for (int x = first; x != std::min(first + 8, camera.width()); ++x) {
-            const auto i = static_cast<std::size_t>(x - first);
-            use(x, y, std::isnan(u[i]) ? ray_of(x, y) : vec2{u[i], v[i]});
-          }
+  } else if constexpr (std::same_as<Camera, radial_tangential>) {
+    const auto unproject =
+        simd::kernel<detail::unproject_eight, void(const radial_tangential&, int, int, double*, double*)>();
+    std::array<double, 8> u, v;
+    for (int y = 0; y != camera.height(); ++y)
+      for (int first = 0; first < camera.width(); first += 8) {
+        unproject(camera, first, y, u.data(), v.data());
+        for (int x = first; x != std::min(first + 8, camera.width()); ++x) {
+          const auto i = static_cast<std::size_t>(x - first);
+          use(x, y, std::isnan(u[i]) ? ray_of(x, y) : vec2{u[i], v[i]});
         }
-      } else {
-        for (int x = 0; x != camera.width(); ++x) use(x, y, ray_of(x, y));
       }
-    }
+  } else {
+    for (int y = 0; y != camera.height(); ++y)
+      for (int x = 0; x != camera.width(); ++x) use(x, y, ray_of(x, y));
   }
 }
 
