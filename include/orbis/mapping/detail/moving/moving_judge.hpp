@@ -210,8 +210,7 @@ class moving_judge {
     else
       with_model(camera_);
   }
-  /// Also removes the neighbours of removed cells if they belong to the same surface, except those shown by more views
-  /// than have rays through them.
+  /// Also removes the neighbours of removed cells if they belong to the same surface, see moving_filter_options::grow.
   void grow(const view& v) {
     const int across = grid_.across, down = grid_.down;
     grown_.clear();
@@ -219,7 +218,7 @@ class moving_judge {
       for (int x = 0; x != across; ++x) {
         const auto i = static_cast<std::size_t>(y * across + x);
         const float z = v.cells.depth(i);
-        if (verdict_[i] != 0 || z == 0.0F || v.shown[i] > v.through[i]) continue;
+        if (verdict_[i] != 0 || z == 0.0F || v.shown[i] > v.through[i] + (v.through[i] != 0 ? 1 : 0)) continue;
         const auto reaches = [&](int u, int w) {
           if (u < 0 || u >= across || w < 0 || w >= down) return false;
           const auto j = static_cast<std::size_t>(w * across + u);
