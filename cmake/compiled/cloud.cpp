@@ -12,6 +12,7 @@
 #include <orbis/cloud/radius-inl.hpp>
 #include <orbis/cloud/ray_evidence-inl.hpp>
 #include <orbis/cloud/select-inl.hpp>
+#include <orbis/cloud/smeared_edges-inl.hpp>
 #include <orbis/cloud/statistical-inl.hpp>
 
 namespace orbis::cloud::detail {
@@ -30,6 +31,8 @@ template automatic_result choose_and_filter(const policy&, const point_view&, st
                                             const select_options&, const view_judge&);
 template flying_pixel_count read_without_flying_pixels(const policy&, const depth_row_reader&, image_view<float>,
                                                        const flying_pixel_options&, flying_pixel_workspace&);
+template std::size_t read_without_smeared_edges(const policy&, const depth_row_reader&, image_view<float>,
+                                                const smeared_edge_options&, smeared_edge_workspace&);
 template void write_smoothed_depth(const policy&, const depth_row_reader&, image_view<float>,
                                    const depth_smoothing_options&, image<float>&);
 

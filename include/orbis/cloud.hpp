@@ -20,6 +20,7 @@
 /// | `select.hpp`               | automatic selection and application of filters                              |
 /// | `select_by_views.hpp`      | the same, with the depth images that show the cloud                         |
 /// | `sensor_origins.hpp`       | the sensor position for each point                                          |
+/// | `smeared_edges.hpp`        | removal of the depth that a moving camera measures at edges                 |
 /// | `statistical.hpp`          | filter: mean neighbour distance above mu + alpha sigma; also relative to range |
 /// | `view_samples.hpp`         | samples of each depth image, used to compare images with each other         |
 /// | `voxel_grid.hpp`           | voxel-grid downsampling: one point per occupied voxel                       |
@@ -41,6 +42,7 @@
 #include <orbis/cloud/select.hpp>
 #include <orbis/cloud/select_by_views.hpp>
 #include <orbis/cloud/sensor_origins.hpp>
+#include <orbis/cloud/smeared_edges.hpp>
 #include <orbis/cloud/statistical.hpp>
 #include <orbis/cloud/view_samples.hpp>
 #include <orbis/cloud/voxel_grid.hpp>
