@@ -8,10 +8,12 @@
 #include <cstdint>
 #include <utility>
 
+#include <orbis/camera/any.hpp>
 #include <orbis/camera/depth.hpp>
 #include <orbis/camera/rgbd_frame.hpp>
 #include <orbis/cloud/depth_smoothing.hpp>
 #include <orbis/cloud/flying_pixels.hpp>
+#include <orbis/cloud/smeared_edges.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/image.hpp>
 #include <orbis/slam/measure.hpp>
@@ -23,26 +25,25 @@ namespace app {
 /// Smooths depth images according to the noise of their sensor.
 class frame_smoother {
  public:
-  explicit frame_smoother(const frame_source& source) {
+  explicit frame_smoother(const frame_source& source) : camera_{source.camera.model} {
     const double focal = source.camera.model.k().fx;
     options_.steepest = steepest / focal;
-    smear_ = focal * integration;
-    if (source.is_stereo() && source.camera.baseline)
-      options_.noise = flying_.noise = disparity_noise / (focal * *source.camera.baseline);
+    if (!source.is_stereo()) return;
+    integration_ = 0.0;  // depth from two images has no ramps: an edge moves in both
+    if (source.camera.baseline) options_.noise = flying_.noise = disparity_noise / (focal * *source.camera.baseline);
   }
 
-  /// The frame with smoothed depth, in the unit of its depth image. Flying pixels are removed and, if the camera turns
-  /// so quickly that it smears depth over edges, all pixels that are on no surface; otherwise, the filter of the cloud
-  /// judges these. `m`: the motion of the camera; zero if it is unknown. Valid until the next call.
+  /// The frame with smoothed depth, in the unit of its depth image, without flying pixels and without the depth that
+  /// the motion of a depth camera smears over edges. `m`: the motion; zero if it is unknown. Valid until the next call.
   [[nodiscard]] const orbis::camera::rgbd_frame& operator()(const orbis::camera::rgbd_frame& frame,
                                                             const orbis::slam::frame_motion& m) {
-    const double turn = m.twist.tail<3>().norm();  // radians per second
     if (metres_.width() != frame.depth.width() || metres_.height() != frame.depth.height())
       metres_ = orbis::image<float>(frame.depth.width(), frame.depth.height());
-    options_.resolution = 1.0 / frame.depth_scale;
-    flying_.reach = static_cast<int>(std::clamp(std::ceil(smear_ * turn), 2.0, 8.0));
-    options_.min_support = flying_.reach > 2 ? orbis::cloud::depth_smoothing_options{}.min_support : 0.0;
-    orbis::cloud::remove_flying_pixels(orbis::seq, frame.depth_metres(), metres_.view(), flying_, workspace_);
+    options_.resolution = smeared_.resolution = 1.0 / frame.depth_scale;
+    orbis::cloud::remove_smeared_edges(orbis::seq, frame.depth_metres(), camera_, m.twist, integration_, metres_.view(),
+                                       smeared_, smeared_workspace_);
+    orbis::cloud::remove_flying_pixels(orbis::seq, orbis::camera::depth_view<float>{std::as_const(metres_).view()},
+                                       metres_.view(), flying_, workspace_);
     orbis::cloud::smooth_depth(orbis::seq, orbis::camera::depth_view<float>{std::as_const(metres_).view()},
                                metres_.view(), options_, memory_);
     smooth_ = frame;
@@ -57,8 +58,10 @@ class frame_smoother {
  private:
   static constexpr double steepest = 4.0;          // tangent of the steepest slant of a measured surface: 76 degrees
   static constexpr double disparity_noise = 0.25;  // standard deviation of stereo matching, pixels
-  static constexpr double integration = 0.016;     // seconds in which a depth image is captured, half a frame's time
-  double smear_ = 0.0;                             // pixels, for one radian per second
+  orbis::camera::any_camera camera_;
+  double integration_ = 0.016;  // seconds in which a depth image is captured: half a frame's time
+  orbis::cloud::smeared_edge_options smeared_;
+  orbis::cloud::smeared_edge_workspace smeared_workspace_;
   orbis::cloud::flying_pixel_options flying_;
   orbis::cloud::flying_pixel_workspace workspace_;
   orbis::cloud::depth_smoothing_options options_;

@@ -89,32 +89,6 @@ TEST_CASE("edges, corners and thin objects of any orientation stay as they are",
   }
 }
 
-TEST_CASE("the ramp between two surfaces is removed", "[depth_smoothing]") {
-  for (const double degrees : {0.0, 10.0, 20.0, 30.0, 45.0, 70.0, 90.0}) {
-    const double angle = degrees * 0.017453292519943295;
-    image<float> depth(width, height);
-    for (int y = 0; y != height; ++y)
-      for (int x = 0; x != width; ++x) {
-        const double across = std::cos(angle) * (x - 35) + std::sin(angle) * (y - 25);
-        depth(x, y) = 2.0F - 0.125F * static_cast<float>(std::clamp(across, -4.0, 4.0) + 4.0);
-      }
-    const image<float> out = smoothed(depth), all = smoothed(depth, {.min_support = 0.0});
-    std::size_t ramp = 0, removed = 0, others = 0;
-    for (int y = 4; y != height - 4; ++y)
-      for (int x = 4; x != width - 4; ++x) {
-        const bool is_ramp = depth(x, y) < 1.85F && depth(x, y) > 1.15F;
-        ramp += is_ramp ? 1 : 0;
-        removed += is_ramp && out(x, y) == 0.0F ? 1 : 0;
-        others += (depth(x, y) == 1.0F || depth(x, y) == 2.0F) && out(x, y) == 0.0F ? 1 : 0;
-      }
-    CAPTURE(degrees, ramp, removed, others);
-    CHECK(ramp > 150);
-    CHECK(static_cast<double>(removed) > 0.95 * static_cast<double>(ramp));
-    CHECK(others == 0);
-    CHECK(std::ranges::count(all.pixels(), 0.0F) == 0);
-  }
-}
-
 TEST_CASE("missing depth stays missing and does not count", "[depth_smoothing]") {
   image<float> depth = noisy_plane(0.001F, 0.0F);
   depth(5, 5) = 0.0F;

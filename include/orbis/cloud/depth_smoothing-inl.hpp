@@ -26,9 +26,8 @@ struct pixel_pair {
 };
 
 struct smoothing_limits {
-  float noise;        ///< maximum difference between the sum of a pair and twice the pixel, 1 / metre
-  float resolution;   ///< as above, for quantisation: metres
-  float min_support;  ///< see depth_smoothing_options
+  float noise;       ///< maximum difference between the sum of a pair and twice the pixel, 1 / metre
+  float resolution;  ///< as above, for quantisation: metres
 };
 
 /// Writes the smoothed depths of a row of `width` pixels. `center`: their inverse depths, NaN where unknown, followed
@@ -43,20 +42,16 @@ struct smooth_row {
     for (int x = 0; x < width; x += static_cast<int>(lanes::count), center += lanes::count) {
       const lanes w = lanes::load(center), twice = w + w;
       const lanes apart = max(lanes(limits.noise), lanes(limits.resolution) * (w * w));
-      lanes sum = w, agreed = zero, near = zero, seen = zero;
+      lanes sum = w, agreed = zero;
       for (const pixel_pair& pair : pairs) {
         const lanes before = lanes::load(center - pair.offset), after = lanes::load(center + pair.offset);
         const lanes both = before + after, slope = max(apart, lanes(pair.steepest) * w);
-        const auto before_is_near = abs(before - w) < slope, after_is_near = abs(after - w) < slope;
-        const auto agrees = (abs(both - twice) < apart) & before_is_near;
+        const auto agrees = (abs(both - twice) < apart) & (abs(before - w) < slope);
         sum = sum + select(agrees, both, zero);
         agreed = agreed + select(agrees, one, zero);
-        near = near + select(before_is_near, one, zero) + select(after_is_near, one, zero);
-        seen = seen + select(before > zero, one, zero) + select(after > zero, one, zero);
       }
       const lanes mean = (agreed + agreed + one) / sum;
-      const lanes kept = select((w > zero) & (near >= lanes(limits.min_support) * seen), mean, zero);
-      kept.store(depth + x, std::min(lanes::count, static_cast<std::size_t>(width - x)));
+      select(w > zero, mean, zero).store(depth + x, std::min(lanes::count, static_cast<std::size_t>(width - x)));
     }
   }
 };
@@ -89,8 +84,7 @@ void write_smoothed_depth(const Policy& policy, const depth_row_reader& depth, i
         pairs[count++] = {dy * stride + dx, static_cast<float>(options.steepest * std::max(std::abs(dx), dy))};
   const double of_sum = std::sqrt(6.0) * options.sigmas;  // of the sum of a pair minus twice the pixel
   const smoothing_limits limits{static_cast<float>(of_sum * options.noise),
-                                static_cast<float>(of_sum * 0.5 * options.resolution),  // rounded by up to half a step
-                                static_cast<float>(options.min_support)};
+                                static_cast<float>(of_sum * 0.5 * options.resolution)};  // rounded by up to half a step
   auto* const smooth =
       simd::kernel<smooth_row, void(const float*, int, std::span<const pixel_pair>, const smoothing_limits&, float*)>();
   for_each_index(policy, static_cast<std::size_t>(height), grain, [&](std::size_t row) {

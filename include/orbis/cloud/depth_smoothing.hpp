@@ -4,9 +4,7 @@
 ///
 /// Inverse depth is linear over the image of a plane of any slant, so the mean of two pixels on opposite sides of a
 /// pixel, at the same distance, measures the inverse depth of the pixel itself. Each pixel becomes the mean of itself
-/// and of all such pairs around it that agree with it within the noise. A pair across an edge does not agree. A pixel
-/// is removed if it is on no surface, that is, if few of the pixels around it are at a depth that a slanted surface
-/// could have there: a depth camera that moves measures a steep ramp between two surfaces.
+/// and of all such pairs around it that agree with it within the noise. A pair across an edge does not agree.
 ///
 /// Sources: C. Tomasi, R. Manduchi, "Bilateral filtering for gray and color images", ICCV 1998; its use on depth images
 /// before they are mapped: R. A. Newcombe et al., "KinectFusion: real-time dense surface mapping and tracking", ISMAR
@@ -33,10 +31,6 @@ struct depth_smoothing_options {
   /// Maximum relative change of inverse depth per pixel on a surface: the tangent of its steepest slant divided by the
   /// focal length in pixels. Default: 75 degrees at 500 pixels.
   double steepest = 0.0075;
-  /// A pixel is removed if fewer than this share of the pixels around it that have a depth could be on the same
-  /// surface; 0: none is removed. The default keeps pixels at edges and corners, and objects with a width of two
-  /// pixels.
-  double min_support = 0.25;
 };
 
 namespace detail {
@@ -48,7 +42,7 @@ void write_smoothed_depth(const Policy& policy, const depth_row_reader& depth, i
 
 }  // namespace detail
 
-/// Writes the smoothed depth in metres to `out`; 0 where depth is missing or the pixel is removed. `memory`: working
+/// Writes the smoothed depth in metres to `out`; 0 where depth is missing. `memory`: working
 /// memory, allocated by the first call for images of a size. `out` may be the memory that `depth` reads, if that holds
 /// metres. O(width * height * radius^2); the same result for every policy and processor.
 /// @pre out is as large as depth; radius is 1 ... 8
