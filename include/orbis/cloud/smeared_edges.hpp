@@ -42,15 +42,16 @@ struct smeared_edge_options {
 struct smeared_edge_workspace {
   static constexpr int edge = 32;  ///< edge of a block, pixels
   struct block {
-    int x = 0, y = 0;  ///< motion of the image during the exposure, pixels; at most `edge` along each axis
-    bool has_positive = false, has_negative = false;
-    std::size_t removed = 0;
+    int x = 0, y = 0;         ///< motion of the image during the exposure, pixels; at most `edge` along each axis
+    std::uint8_t signs = 0;   ///< of all pixels
+    std::size_t removed = 0;  ///< number of pixels
     [[nodiscard]] int length() const noexcept { return std::max(std::abs(x), std::abs(y)); }
   };
 
   std::vector<block> blocks;  ///< of the image, row by row
+  int width = 0, height = 0;  ///< of the last image
   image<float> inverse;       ///< inverse depths; 0 where depth is unknown
-  image<std::int8_t> signs;   ///< of the second differences; 0 where they are not significant
+  image<std::uint8_t> signs;  ///< of significant second differences; 1: positive, 2: negative
 };
 
 namespace detail {
