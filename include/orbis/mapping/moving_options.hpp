@@ -22,8 +22,9 @@ struct moving_filter_options {
   int min_through = 1;  ///< minimum number of keyframes whose rays pass through a removed cell, > 0
   double ratio = 1.0;   ///< minimum ratio (exclusive) of keyframes with rays through a cell to keyframes that show it
   /// Distance in cells up to which neighbours of a removed cell are removed too, if they belong to the same surface and
-  /// the keyframes that show them do not outnumber those whose rays pass through them. If there is a ray through the
-  /// cell, one more keyframe may show it: two keyframes in quick succession show a moving object at one place. >= 0
+  /// the keyframes that show them do not outnumber those whose rays pass through them. If rays of any keyframe pass
+  /// through a cell, the number of keyframes that show it may exceed theirs by one, because two keyframes in succession
+  /// show a moving object at one place. `min_through` and `ratio` do not apply. >= 0
   int grow = 8;
   /// Share of a keyframe's cells whose verdict has to change before the keyframe is marked again in the map; ignored
   /// when the keyframe leaves the window.

@@ -218,7 +218,8 @@ class moving_judge {
       for (int x = 0; x != across; ++x) {
         const auto i = static_cast<std::size_t>(y * across + x);
         const float z = v.cells.depth(i);
-        if (verdict_[i] != 0 || z == 0.0F || v.shown[i] > v.through[i] + (v.through[i] != 0 ? 1 : 0)) continue;
+        const int excess = v.through[i] != 0 ? 1 : 0;  // two keyframes in succession see a moving object at one place
+        if (verdict_[i] != 0 || z == 0.0F || v.shown[i] > v.through[i] + excess) continue;
         const auto reaches = [&](int u, int w) {
           if (u < 0 || u >= across || w < 0 || w >= down) return false;
           const auto j = static_cast<std::size_t>(w * across + u);
