@@ -4,7 +4,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <utility>
 
@@ -22,25 +21,25 @@
 
 namespace app {
 
-/// Smooths depth images according to the noise of their sensor.
+/// Smooths depth images according to the noise of their sensor, and removes pixels that show no surface.
 class frame_smoother {
  public:
   explicit frame_smoother(const frame_source& source) : camera_{source.camera.model} {
     const double focal = source.camera.model.k().fx;
     options_.steepest = steepest / focal;
     if (!source.is_stereo()) return;
-    integration_ = 0.0;  // depth from two images has no ramps: an edge moves in both
+    exposure_ = 0.0;  // stereo matching finds edges at their places in both images: they do not become ramps
     if (source.camera.baseline) options_.noise = flying_.noise = disparity_noise / (focal * *source.camera.baseline);
   }
 
-  /// The frame with smoothed depth, in the unit of its depth image, without flying pixels and without the depth that
-  /// the motion of a depth camera smears over edges. `m`: the motion; zero if it is unknown. Valid until the next call.
+  /// The frame with smoothed depth, in the unit of its depth image. Flying pixels are removed, and the depth that the
+  /// camera's motion `m` smears over edges (zero if it is unknown). Valid until the next call.
   [[nodiscard]] const orbis::camera::rgbd_frame& operator()(const orbis::camera::rgbd_frame& frame,
                                                             const orbis::slam::frame_motion& m) {
     if (metres_.width() != frame.depth.width() || metres_.height() != frame.depth.height())
       metres_ = orbis::image<float>(frame.depth.width(), frame.depth.height());
     options_.resolution = smeared_.resolution = 1.0 / frame.depth_scale;
-    orbis::cloud::remove_smeared_edges(orbis::seq, frame.depth_metres(), camera_, m.twist, integration_, metres_.view(),
+    orbis::cloud::remove_smeared_edges(orbis::seq, frame.depth_metres(), camera_, m.twist, exposure_, metres_.view(),
                                        smeared_, smeared_workspace_);
     orbis::cloud::remove_flying_pixels(orbis::seq, orbis::camera::depth_view<float>{std::as_const(metres_).view()},
                                        metres_.view(), flying_, workspace_);
@@ -59,7 +58,7 @@ class frame_smoother {
   static constexpr double steepest = 4.0;          // tangent of the steepest slant of a measured surface: 76 degrees
   static constexpr double disparity_noise = 0.25;  // standard deviation of stereo matching, pixels
   orbis::camera::any_camera camera_;
-  double integration_ = 0.016;  // seconds in which a depth image is captured: half a frame's time
+  double exposure_ = 0.016;  // of a depth image, seconds: half the frame interval at 30 Hz
   orbis::cloud::smeared_edge_options smeared_;
   orbis::cloud::smeared_edge_workspace smeared_workspace_;
   orbis::cloud::flying_pixel_options flying_;

@@ -53,14 +53,12 @@ TEST_CASE("the noise of planes of any slant is reduced without bias", "[depth_sm
       for (int x = 3; x != width - 3; ++x) {
         const double exact = 0.5 + static_cast<double>(slope) * (x - 0.4 * y);
         before += std::pow(1.0 / static_cast<double>(depth(x, y)) - exact, 2);
-        if (out(x, y) == 0.0F) continue;
         const double error = 1.0 / static_cast<double>(out(x, y)) - exact;
         after += error * error;
         sum += error;
         ++count;
       }
     CAPTURE(slope, std::sqrt(before / static_cast<double>(count)), std::sqrt(after / static_cast<double>(count)));
-    CHECK(count >= std::size_t{(width - 6) * (height - 6)} - 3);  // noise removes hardly any
     CHECK(after < 0.16 * before);  // 36 neighbours; those pairs that disagree do not count
     CHECK(std::abs(sum) < 0.05 * static_cast<double>(noise) * static_cast<double>(count));
   }
@@ -143,23 +141,19 @@ TEST_CASE("smoothing halves the depth error of a synthetic room", "[depth_smooth
     image<float> out(depth.width(), depth.height());
     smooth_depth(orbis::seq, depth, out, {.resolution = 1.0 / frame.depth_scale, .steepest = 0.015});
     double before = 0.0, after = 0.0;
-    std::size_t valid = 0, removed = 0;
+    std::size_t missing = 0;
     for (int y = 0; y != out.height(); ++y)
       for (int x = 0; x != out.width(); ++x) {
         const float z = depth(x, y), truth = exact.depth(x, y);
+        missing += (z > 0.0F) != (out(x, y) > 0.0F) ? 1 : 0;
         if (!(z > 0.0F)) continue;
-        ++valid;
-        if (out(x, y) == 0.0F) {
-          ++removed;
-          continue;
-        }
         const auto squared = [&](float d) { return std::pow(static_cast<double>(1.0F / d - 1.0F / truth), 2); };
         if (std::abs(z - truth) > 0.1F) continue;  // a flying pixel
         before += squared(z);
         after += squared(out(x, y));
       }
-    CAPTURE(f, before, after, removed, valid);
+    CAPTURE(f, before, after);
     CHECK(after < 0.25 * before);
-    CHECK(static_cast<double>(removed) < 0.03 * static_cast<double>(valid));
+    CHECK(missing == 0);
   }
 }

@@ -42,9 +42,9 @@ void write_smoothed_depth(const Policy& policy, const depth_row_reader& depth, i
 
 }  // namespace detail
 
-/// Writes the smoothed depth in metres to `out`; 0 where depth is missing. `memory`: working
-/// memory, allocated by the first call for images of a size. `out` may be the memory that `depth` reads, if that holds
-/// metres. O(width * height * radius^2); the same result for every policy and processor.
+/// Writes the smoothed depth in metres to `out`; 0 where depth is missing. `memory`: working memory, allocated by the
+/// first call for images of a size. `out` may be the memory that `depth` reads, if that holds metres. O(width * height
+/// * radius^2); the same result for every policy and processor.
 /// @pre out is as large as depth; radius is 1 ... 8
 template <execution_policy Policy, camera::depth_source Depth>
 void smooth_depth(const Policy& policy, const Depth& depth, image_view<float> out,

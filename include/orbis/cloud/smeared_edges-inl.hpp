@@ -17,28 +17,28 @@ namespace orbis::cloud::detail {
 template <execution_policy Policy>
 std::size_t read_without_smeared_edges(const Policy& policy, const depth_row_reader& depth, image_view<float> out,
                                        const smeared_edge_options& options, smeared_edge_workspace& workspace) {
-  constexpr int edge = smeared_edge_workspace::edge;
+  constexpr int size = smeared_edge_workspace::block_size;
   const int width = out.width(), height = out.height();
-  const int across = (width + edge - 1) / edge, down = (height + edge - 1) / edge;
-  // Both images have a border of one block, which stays 0: no motion is longer than a block.
+  const int across = (width + size - 1) / size, down = (height + size - 1) / size;
+  const bool is_smeared =
+      std::any_of(workspace.blocks.begin(), workspace.blocks.end(), [](const auto& b) { return b.length() >= 2; });
   image<float>& inverse = workspace.inverse;
   image<std::uint8_t>& signs = workspace.signs;
-  if (workspace.width != width || workspace.height != height) {
-    inverse = image<float>((across + 2) * edge, (down + 2) * edge);
-    signs = image<std::uint8_t>((across + 2) * edge, (down + 2) * edge);
+  if (is_smeared && (workspace.width != width || workspace.height != height)) {
+    // The border stays 0. It is as wide as the longest motion, so that no access needs a test.
+    inverse = image<float>((across + 2) * size, (down + 2) * size);
+    signs = image<std::uint8_t>((across + 2) * size, (down + 2) * size);
     workspace.width = width;
     workspace.height = height;
   }
-  const bool is_smeared =
-      std::any_of(workspace.blocks.begin(), workspace.blocks.end(), [](const auto& b) { return b.length() >= 2; });
-  for_each_index(policy, static_cast<std::size_t>(height), edge, [&](std::size_t row) {
+  for_each_index(policy, static_cast<std::size_t>(height), size, [&](std::size_t row) {
     const int y = static_cast<int>(row);
     float* const z = out.row(y).data();
     depth.read(depth.depth, y, width, z);  // the output may overwrite the input
     for (int x = 0; x != width; ++x)
       if (!(z[x] > 0.0F && z[x] <= std::numeric_limits<float>::max())) z[x] = 0.0F;
     if (!is_smeared) return;
-    float* const w = &inverse(edge, edge + y);
+    float* const w = &inverse(size, size + y);
     for (int x = 0; x != width; ++x) w[x] = z[x] > 0.0F ? 1.0F / z[x] : 0.0F;
   });
   if (!is_smeared) return 0;
@@ -46,22 +46,23 @@ std::size_t read_without_smeared_edges(const Policy& policy, const depth_row_rea
   const double of_difference = std::sqrt(6.0) * options.sigmas;
   const auto noise = static_cast<float>(of_difference * options.noise);
   const auto resolution = static_cast<float>(of_difference * 0.5 * options.resolution);  // rounded by half a step
-  const auto stride = static_cast<std::ptrdiff_t>((across + 2) * edge);
+  const auto stride = static_cast<std::ptrdiff_t>((across + 2) * size);
   // Calls f(block, at, x0, y) for each row of each block; `at`: its offset in the padded images.
   const auto for_each_row = [&](const auto& f) {
     for_each_index(policy, workspace.blocks.size(), 1, [&](std::size_t number) {
-      const int x0 = static_cast<int>(number) % across * edge, y0 = static_cast<int>(number) / across * edge;
-      for (int y = y0; y != std::min(height, y0 + edge); ++y)
-        f(workspace.blocks[number], (y + edge) * stride + x0 + edge, x0, y);
+      const int x0 = static_cast<int>(number) % across * size, y0 = static_cast<int>(number) / across * size;
+      for (int y = y0; y != std::min(height, y0 + size); ++y)
+        f(workspace.blocks[number], (y + size) * stride + x0 + size, x0, y);
     });
   };
+  // No sum contains a product, so no operations are fused, and the signs are the same on every processor.
   for_each_row([&](smeared_edge_workspace::block& b, std::ptrdiff_t at, int, int) {
-    std::array<std::uint8_t, edge> found{};
+    std::array<std::uint8_t, size> found{};
     if (b.length() >= 2) {
       const float* const here = inverse.pixels().data() + at;
       const float* const before = here - (b.y * stride + b.x);
       const float* const after = here + (b.y * stride + b.x);
-      for (std::size_t i = 0; i != edge; ++i) {
+      for (std::size_t i = 0; i != size; ++i) {
         const float w = here[i], difference = (before[i] + after[i]) - (w + w), quantised = resolution * (w * w);
         const float least = quantised < noise ? noise : quantised;
         const bool is_known = (w > 0.0F) & (before[i] > 0.0F) & (after[i] > 0.0F);
@@ -72,14 +73,14 @@ std::size_t read_without_smeared_edges(const Policy& policy, const depth_row_rea
     std::copy(found.begin(), found.end(), signs.pixels().data() + at);
   });
   for_each_row([&](smeared_edge_workspace::block& b, std::ptrdiff_t at, int x0, int y) {
-    const int length = b.length(), reach = length / 2 + 1;
+    const int length = b.length(), reach = length / 2 + 1;  // the ends of a ramp are rounded to pixels
     if (length < 2) return;
-    std::array<std::uint8_t, edge> near{};
+    std::array<std::uint8_t, size> near{};
     for (int i = -reach; i <= reach; ++i) {
       const std::uint8_t* const there = signs.pixels().data() + at + (b.y * i / length * stride + b.x * i / length);
-      for (std::size_t k = 0; k != edge; ++k) near[k] |= there[k];
+      for (std::size_t k = 0; k != size; ++k) near[k] |= there[k];
     }
-    for (int x = x0; x != std::min(width, x0 + edge); ++x) {
+    for (int x = x0; x != std::min(width, x0 + size); ++x) {
       if (near[static_cast<std::size_t>(x - x0)] != 3 || out(x, y) == 0.0F) continue;
       out(x, y) = 0.0F;
       ++b.removed;

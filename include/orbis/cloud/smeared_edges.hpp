@@ -2,17 +2,21 @@
 /// @file
 /// Removal of the depth that a moving camera measures at edges.
 ///
-/// A depth camera that moves while it captures an image measures means over its motion. Surfaces stay surfaces, but the
-/// edge between two of them becomes a ramp where there is no surface. Along the direction of the motion in the image,
-/// the ramp is as long as the motion.
+/// A depth camera averages over its motion during the exposure. Planes stay planes, but an edge becomes a ramp between
+/// two surfaces, where there is no surface. Along the direction of the motion in the image, the ramp is as long as the
+/// motion.
 ///
-/// Inverse depth is linear over the image of a plane, so the sum of the inverse depths of the pixels one motion before
-/// and one motion after a pixel, minus twice that of the pixel itself, is 0 on a plane of any slant. This second
-/// difference is positive at one end of a ramp and negative at the other; where two surfaces meet without an edge, it
-/// has one sign. A pixel is removed if both signs occur within half a motion of it.
+/// Let m be the motion of the image during the exposure, in pixels. The inverse depth at x - m plus that at x + m minus
+/// twice that at x is 0 where the image shows a plane, because inverse depth is linear there. This second difference is
+/// positive at one end of a ramp and negative at the other; a crease between two planes has one sign. A pixel is
+/// removed if both signs occur along m within a distance of half of m, plus one pixel for rounding.
+///
+/// The test does not see whether an edge is blurred: if the image moved by less than m, the pixels next to sharp edges
+/// are removed too. Objects that are narrower than m are removed, because all of their pixels are near two edges.
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <cstddef>
@@ -31,27 +35,27 @@
 
 namespace orbis::cloud {
 
+/// Thresholds of `remove_smeared_edges`; finite and not negative.
 struct smeared_edge_options {
   double noise = 1.425e-3;    ///< standard deviation of inverse depth, sigma_z / z^2, 1 / metre; default: a Kinect's
   double resolution = 0.001;  ///< quantisation step of depth, metres
-  double sigmas = 2.5;        ///< minimum second difference at the ends of a ramp, in standard deviations of it
+  double sigmas = 2.5;        ///< smallest significant second difference, in multiples of its standard deviation
 };
 
 /// Working memory that calls can share: nothing is allocated after the first call for images of a size. Not
 /// thread-safe.
 struct smeared_edge_workspace {
-  static constexpr int edge = 32;  ///< edge of a block, pixels
+  static constexpr int block_size = 32;  ///< edge of a block, pixels
   struct block {
-    int x = 0, y = 0;         ///< motion of the image during the exposure, pixels; at most `edge` along each axis
-    std::uint8_t signs = 0;   ///< of all pixels
-    std::size_t removed = 0;  ///< number of pixels
+    int x = 0, y = 0;         ///< motion of the image during the exposure, pixels; at most `block_size` along each axis
+    std::size_t removed = 0;  ///< number of removed pixels
     [[nodiscard]] int length() const noexcept { return std::max(std::abs(x), std::abs(y)); }
   };
 
-  std::vector<block> blocks;  ///< of the image, row by row
-  int width = 0, height = 0;  ///< of the last image
-  image<float> inverse;       ///< inverse depths; 0 where depth is unknown
-  image<std::uint8_t> signs;  ///< of significant second differences; 1: positive, 2: negative
+  std::vector<block> blocks;  ///< blocks of the image, row by row
+  image<float> inverse;       ///< inverse depths with a border of one block; 0 where depth is unknown
+  image<std::uint8_t> signs;  ///< signs of the second differences, with the same border; 1: positive, 2: negative
+  int width = 0, height = 0;  ///< size of the images without the border
 };
 
 namespace detail {
@@ -61,28 +65,45 @@ template <execution_policy Policy>
 std::size_t read_without_smeared_edges(const Policy& policy, const depth_row_reader& depth, image_view<float> out,
                                        const smeared_edge_options& options, smeared_edge_workspace& workspace);
 
-/// The motion during `exposure` in the image of the block around a pixel, whose nearest surface has the inverse depth
-/// `inverse`. 0 if the camera model does not cover the block.
+/// The motion during `exposure` in the image of the block around a pixel that shows a surface with the inverse depth
+/// `inverse`. 0 if the camera model does not cover the pixel, or does not cover the surface after the motion.
 template <camera::camera_model Camera>
 [[nodiscard]] smeared_edge_workspace::block motion_in_image(const Camera& camera, const vec6& twist, double exposure,
                                                             const vec2& pixel, double inverse) {
   const auto ray = camera.unproject(pixel);
   if (!ray) return {};
   const auto after = camera.project(camera::moved_by(twist, exposure, *ray, inverse));
-  if (!after) return {};
+  if (!after || !all_finite(*after)) return {};
   const auto limited = [](double d) {
-    return static_cast<int>(
-        std::lround(std::clamp<double>(d, -smeared_edge_workspace::edge, smeared_edge_workspace::edge)));
+    constexpr double most = smeared_edge_workspace::block_size;
+    return static_cast<int>(std::lround(std::clamp(d, -most, most)));
   };
   return {limited((*after)[0] - pixel[0]), limited((*after)[1] - pixel[1])};
+}
+
+/// Inverse depth of the near surfaces in a block: an eighth of its pixels with a depth are nearer, so that single wrong
+/// depths have no effect. 0 if it has no depth. Uses every fourth pixel of every fourth row.
+template <camera::depth_source Depth>
+[[nodiscard]] double near_inverse_depth(const Depth& depth, int x0, int y0, int x1, int y1) {
+  constexpr int step = 4, most = smeared_edge_workspace::block_size / step;
+  std::array<float, std::size_t{most} * most> z{};
+  std::size_t count = 0;
+  for (int y = y0; y < y1; y += step)
+    for (int x = x0; x < x1; x += step)
+      if (const float metres = depth(x, y); metres > 0.0F) z[count++] = metres;
+  if (count == 0) return 0.0;
+  const auto near = z.begin() + static_cast<std::ptrdiff_t>(count / 8);
+  std::nth_element(z.begin(), near, z.begin() + static_cast<std::ptrdiff_t>(count));
+  return 1.0 / static_cast<double>(*near);
 }
 
 }  // namespace detail
 
 /// Writes the depth in metres to `out`, 0 where depth is missing or smeared over an edge. Returns the number of removed
 /// pixels. `twist`: twist of the camera in its own frame, per second, translation first. `exposure`: time during which
-/// the depth image was captured, seconds. `out` may be the memory that `depth` reads, if that holds metres. Motions of
-/// less than two pixels are ignored. O(width * height * motion); the same result for every policy.
+/// the depth image was captured, seconds. `out` may be the memory that `depth` reads, if that holds metres. A motion of
+/// the image that rounds to less than two pixels is ignored; the near surfaces of blocks of 32 x 32 pixels determine
+/// it. O(width * height * motion); the same result for every policy.
 /// @pre depth and out have the camera's size; twist and exposure are finite
 template <execution_policy Policy, camera::depth_source Depth, camera::camera_model Camera>
 std::size_t remove_smeared_edges(const Policy& policy, const Depth& depth, const Camera& camera, const vec6& twist,
@@ -91,17 +112,14 @@ std::size_t remove_smeared_edges(const Policy& policy, const Depth& depth, const
   assert(depth.width() == camera.width() && depth.height() == camera.height());
   assert(out.width() == depth.width() && out.height() == depth.height());
   assert(all_finite(twist) && std::isfinite(exposure));
-  constexpr int edge = smeared_edge_workspace::edge, step = 4;
+  constexpr int size = smeared_edge_workspace::block_size;
   workspace.blocks.clear();
-  for (int y0 = 0; y0 < depth.height(); y0 += edge)
-    for (int x0 = 0; x0 < depth.width(); x0 += edge) {
-      const int x1 = std::min(depth.width(), x0 + edge), y1 = std::min(depth.height(), y0 + edge);
-      double inverse = 0.0;  // translation moves the nearest surface farthest
-      for (int y = y0; y < y1; y += step)
-        for (int x = x0; x < x1; x += step)
-          if (const float z = depth(x, y); z > 0.0F) inverse = std::max(inverse, 1.0 / static_cast<double>(z));
+  for (int y0 = 0; y0 < depth.height(); y0 += size)
+    for (int x0 = 0; x0 < depth.width(); x0 += size) {
+      const int x1 = std::min(depth.width(), x0 + size), y1 = std::min(depth.height(), y0 + size);
+      const vec2 center(0.5 * (x0 + x1 - 1), 0.5 * (y0 + y1 - 1));
       workspace.blocks.push_back(
-          detail::motion_in_image(camera, twist, exposure, vec2(0.5 * (x0 + x1 - 1), 0.5 * (y0 + y1 - 1)), inverse));
+          detail::motion_in_image(camera, twist, exposure, center, detail::near_inverse_depth(depth, x0, y0, x1, y1)));
     }
   return detail::read_without_smeared_edges(detail::as_parallel(policy), detail::make_row_reader(depth), out, options,
                                             workspace);
