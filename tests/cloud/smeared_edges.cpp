@@ -107,7 +107,7 @@ TEST_CASE("surfaces of any slant and their creases stay, also with noise", "[sme
     }
 }
 
-TEST_CASE("a camera that hardly moves smears no edge; translation smears near ones", "[smeared_edges]") {
+TEST_CASE("a camera that hardly moves smears no edge, and translation smears near ones", "[smeared_edges]") {
   image<float> depth = smeared([](double x, double) { return x > 49.5 ? 1.0 : 0.5; }, 8.0, 0.0), out(width, height);
   const depth_view view{depth.view()};
   CHECK(remove_smeared_edges(orbis::seq, view, camera, orbis::zeros<vec6>(), 1.0, out) == 0);
