@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <limits>
 
 #include <orbis/cloud/smeared_edges.hpp>
@@ -22,11 +23,9 @@ std::size_t read_without_smeared_edges(const Policy& policy, const depth_row_rea
   const int across = (width + size - 1) / size, down = (height + size - 1) / size;
   const bool is_smeared =
       std::any_of(workspace.blocks.begin(), workspace.blocks.end(), [](const auto& b) { return b.length() >= 2; });
-  image<float>& inverse = workspace.inverse;
   image<std::uint8_t>& signs = workspace.signs;
   if (is_smeared && (workspace.width != width || workspace.height != height)) {
     // The border stays 0. It is as wide as the longest motion, so that no access needs a test.
-    inverse = image<float>((across + 2) * size, (down + 2) * size);
     signs = image<std::uint8_t>((across + 2) * size, (down + 2) * size);
     workspace.width = width;
     workspace.height = height;
@@ -37,9 +36,6 @@ std::size_t read_without_smeared_edges(const Policy& policy, const depth_row_rea
     depth.read(depth.depth, y, width, z);  // the output may overwrite the input
     for (int x = 0; x != width; ++x)
       if (!(z[x] > 0.0F && z[x] <= std::numeric_limits<float>::max())) z[x] = 0.0F;
-    if (!is_smeared) return;
-    float* const w = &inverse(size, size + y);
-    for (int x = 0; x != width; ++x) w[x] = z[x] > 0.0F ? 1.0F / z[x] : 0.0F;
   });
   if (!is_smeared) return 0;
 
@@ -47,7 +43,7 @@ std::size_t read_without_smeared_edges(const Policy& policy, const depth_row_rea
   const auto noise = static_cast<float>(of_difference * options.noise);
   const auto resolution = static_cast<float>(of_difference * 0.5 * options.resolution);  // rounded by half a step
   const auto stride = static_cast<std::ptrdiff_t>((across + 2) * size);
-  // Calls f(block, at, x0, y) for each row of each block; `at`: its offset in the padded images.
+  // Calls f(block, at, x0, y) for each row of each block; `at`: its offset in the padded image.
   const auto for_each_row = [&](const auto& f) {
     for_each_index(policy, workspace.blocks.size(), 1, [&](std::size_t number) {
       const int x0 = static_cast<int>(number) % across * size, y0 = static_cast<int>(number) / across * size;
@@ -56,18 +52,20 @@ std::size_t read_without_smeared_edges(const Policy& policy, const depth_row_rea
     });
   };
   // No sum contains a product, so no operations are fused, and the signs are the same on every processor.
-  for_each_row([&](smeared_edge_workspace::block& b, std::ptrdiff_t at, int, int) {
+  for_each_row([&](smeared_edge_workspace::block& b, std::ptrdiff_t at, int x0, int y) {
     std::array<std::uint8_t, size> found{};
-    if (b.length() >= 2) {
-      const float* const here = inverse.pixels().data() + at;
-      const float* const before = here - (b.y * stride + b.x);
-      const float* const after = here + (b.y * stride + b.x);
-      for (std::size_t i = 0; i != size; ++i) {
-        const float w = here[i], difference = (before[i] + after[i]) - (w + w), quantised = resolution * (w * w);
-        const float least = quantised < noise ? noise : quantised;
-        const bool is_known = (w > 0.0F) & (before[i] > 0.0F) & (after[i] > 0.0F);
+    const int first = std::max(x0, std::abs(b.x)), last = std::min({width, x0 + size, width - std::abs(b.x)});
+    if (b.length() >= 2 && first < last && std::min(y - b.y, y + b.y) >= 0 && std::max(y - b.y, y + b.y) < height) {
+      const float* const here = &out(first, y);
+      const float* const before = &out(first - b.x, y - b.y);
+      const float* const after = &out(first + b.x, y + b.y);
+      const int offset = first - x0, count = last - first;
+      for (int i = 0; i != count; ++i) {
+        const bool is_known = (here[i] > 0.0F) & (before[i] > 0.0F) & (after[i] > 0.0F);
+        const float w = 1.0F / here[i], difference = (1.0F / before[i] + 1.0F / after[i]) - (w + w);
+        const float quantised = resolution * (w * w), least = quantised < noise ? noise : quantised;
         const int sign = (difference > least ? 1 : 0) | (difference < -least ? 2 : 0);
-        found[i] = static_cast<std::uint8_t>(is_known ? sign : 0);
+        found[static_cast<std::size_t>(offset + i)] = static_cast<std::uint8_t>(is_known ? sign : 0);
       }
     }
     std::copy(found.begin(), found.end(), signs.pixels().data() + at);
