@@ -3,6 +3,7 @@
 // Removal of smeared edges from a depth image, for turns of 0.01 rad/s (nothing is smeared) to 1 rad/s.
 #include <benchmark/benchmark.h>
 
+#include <orbis/camera/any.hpp>
 #include <orbis/camera/rgbd_frame.hpp>
 #include <orbis/cloud/smeared_edges.hpp>
 #include <orbis/core/execution.hpp>

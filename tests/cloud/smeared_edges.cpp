@@ -12,6 +12,7 @@
 #include <orbis/cloud/smeared_edges.hpp>
 #include <orbis/core/execution.hpp>
 #include <orbis/core/image.hpp>
+#include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/io/synthetic.hpp>
 

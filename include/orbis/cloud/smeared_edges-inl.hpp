@@ -24,12 +24,10 @@ std::size_t read_without_smeared_edges(const Policy& policy, const depth_row_rea
   const bool is_smeared =
       std::any_of(workspace.blocks.begin(), workspace.blocks.end(), [](const auto& b) { return b.length() >= 2; });
   image<std::uint8_t>& signs = workspace.signs;
-  if (is_smeared && (workspace.width != width || workspace.height != height)) {
-    // The border stays 0. It is as wide as the longest motion, so that no access needs a test.
-    signs = image<std::uint8_t>((across + 2) * size, (down + 2) * size);
-    workspace.width = width;
-    workspace.height = height;
-  }
+  const int padded_width = (across + 2) * size, padded_height = (down + 2) * size;
+  // The border stays 0. It is as wide as the longest motion, so that no access needs a test.
+  if (is_smeared && (signs.width() != padded_width || signs.height() != padded_height))
+    signs = image<std::uint8_t>(padded_width, padded_height);
   for_each_index(policy, static_cast<std::size_t>(height), size, [&](std::size_t row) {
     const int y = static_cast<int>(row);
     float* const z = out.row(y).data();
@@ -42,13 +40,12 @@ std::size_t read_without_smeared_edges(const Policy& policy, const depth_row_rea
   const double of_difference = std::sqrt(6.0) * options.sigmas;
   const auto noise = static_cast<float>(of_difference * options.noise);
   const auto resolution = static_cast<float>(of_difference * 0.5 * options.resolution);  // rounded by half a step
-  const auto stride = static_cast<std::ptrdiff_t>((across + 2) * size);
-  // Calls f(block, at, x0, y) for each row of each block; `at`: its offset in the padded image.
+  const std::ptrdiff_t stride = padded_width;
+  // Calls f(block, at, x0, y) for each row of each block, also outside the image; `at`: its offset in the padded image.
   const auto for_each_row = [&](const auto& f) {
     for_each_index(policy, workspace.blocks.size(), 1, [&](std::size_t number) {
       const int x0 = static_cast<int>(number) % across * size, y0 = static_cast<int>(number) / across * size;
-      for (int y = y0; y != std::min(height, y0 + size); ++y)
-        f(workspace.blocks[number], (y + size) * stride + x0 + size, x0, y);
+      for (int y = y0; y != y0 + size; ++y) f(workspace.blocks[number], (y + size) * stride + x0 + size, x0, y);
     });
   };
   // No sum contains a product, so no operations are fused, and the signs are the same on every processor.
@@ -72,7 +69,7 @@ std::size_t read_without_smeared_edges(const Policy& policy, const depth_row_rea
   });
   for_each_row([&](smeared_edge_workspace::block& b, std::ptrdiff_t at, int x0, int y) {
     const int length = b.length(), reach = length / 2 + 1;  // the ends of a ramp are rounded to pixels
-    if (length < 2) return;
+    if (length < 2 || y >= height) return;
     std::array<std::uint8_t, size> near{};
     for (int i = -reach; i <= reach; ++i) {
       const std::uint8_t* const there = signs.pixels().data() + at + (b.y * i / length * stride + b.x * i / length);

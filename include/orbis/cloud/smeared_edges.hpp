@@ -54,7 +54,6 @@ struct smeared_edge_workspace {
 
   std::vector<block> blocks;  ///< blocks of the image, row by row
   image<std::uint8_t> signs;  ///< signs of the second differences, with a border of one block; 1: positive, 2: negative
-  int width = 0, height = 0;  ///< size of the image without the border
 };
 
 namespace detail {
