@@ -35,7 +35,7 @@ std::optional<exit_code> check_files(const frame_source& source, const settings&
   if (!s.load_map.empty() && !std::filesystem::exists(s.load_map, ignored))
     return console.error({orbis::errc::not_found, s.load_map.string(), "no such file"}), bad_input;
   if (std::filesystem::is_directory(s.load_map, ignored))
-    return console.error({orbis::errc::invalid_argument, s.load_map.string(), "is a directory"}), bad_input;
+    return console.error({orbis::errc::unreadable, s.load_map.string(), "is a directory"}), bad_input;
   if (const auto conflict = find_overwritten(s, input_files(s, source.files)))
     return console.error(*conflict), bad_usage;
   if (const auto unwritable = find_unwritable(s)) return console.error(*unwritable), bad_input;

@@ -41,10 +41,9 @@ class frame_smoother {
     options_.resolution = smeared_.resolution = 1.0 / frame.depth_scale;
     orbis::cloud::remove_smeared_edges(orbis::seq, frame.depth_metres(), camera_, m.twist, exposure_, metres_.view(),
                                        smeared_, smeared_workspace_);
-    orbis::cloud::remove_flying_pixels(orbis::seq, orbis::camera::depth_view<float>{std::as_const(metres_).view()},
-                                       metres_.view(), flying_, workspace_);
-    orbis::cloud::smooth_depth(orbis::seq, orbis::camera::depth_view<float>{std::as_const(metres_).view()},
-                               metres_.view(), options_, memory_);
+    const orbis::camera::depth_view<float> metres{std::as_const(metres_).view()};
+    orbis::cloud::remove_flying_pixels(orbis::seq, metres, metres_.view(), flying_, workspace_);
+    orbis::cloud::smooth_depth(orbis::seq, metres, metres_.view(), options_, memory_);
     smooth_ = frame;
     constexpr float largest = 65534.0F;  // the largest stored value of a measurement
     const auto scale = static_cast<float>(frame.depth_scale);
