@@ -166,7 +166,6 @@ class depth_unfilter {
     }
   };
 
-  /// Decodes `rows` rows from row y on, as far as they exist. @pre the rows above are decoded
   const unsigned char* raw_;
   image<std::uint16_t>& out_;
 };

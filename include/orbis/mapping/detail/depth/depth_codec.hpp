@@ -13,8 +13,7 @@
 ///   9(8), 2000, section III.A.
 /// - a run consists of pixels, with depth or without (0), that equal their prediction.
 /// - a difference is relative to the prediction or, if that is 0, to the last nonzero rank that was coded in the row.
-/// The
-///   difference 0 to a prediction with depth means a pixel without depth.
+///   The difference 0 to a prediction with depth means a pixel without depth.
 /// - a group has one data bit in a run length and two in a difference, because most of these numbers are small.
 ///
 /// A row depends on the row above only through ranks, so the decoder computes the ranks of eight rows at the same time,
