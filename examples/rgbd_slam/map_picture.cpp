@@ -5,9 +5,11 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 #include "picture_colors.hpp"
 
@@ -31,10 +33,37 @@ class picture {
     inverse_depth_ = {inverse_depths.data(), width, height};
   }
 
-  /// Draws a convex quadrilateral; each corner is a pixel and a depth.
+  /// Draws a planar convex quadrilateral; each corner is a pixel and a depth.
   void quad(const std::array<vec3, 4>& c, rgb8 color) {
-    triangle(c[0], c[1], c[2], color);
-    triangle(c[0], c[2], c[3], color);
+    const vec3 u = c[1] - c[0], v = c[2] - c[0];
+    const double area = u.x() * v.y() - u.y() * v.x();
+    if (!(std::abs(area) > 1e-9)) return;
+    // The inverse depth of a plane is linear in the image.
+    const double at_first = 1.0 / c[0].z(), du = 1.0 / c[1].z() - at_first, dv = 1.0 / c[2].z() - at_first;
+    const double per_x = (du * v.y() - dv * u.y()) / area, per_y = (dv * u.x() - du * v.x()) / area;
+    const auto [top, bottom] = std::minmax({c[0].y(), c[1].y(), c[2].y(), c[3].y()});
+    const int first = first_pixel(top, color_.height()), last = last_pixel(bottom, color_.height());
+    for (int y = first; y <= last; ++y) {
+      double left = 0.0, right = color_.width() - 1.0;
+      for (std::size_t i = 0; i != 4; ++i) {
+        const vec3 &a = c[i], &b = c[(i + 1) % 4];
+        const double rise = b.y() - a.y();
+        if (rise == 0.0) continue;  // the rows of other edges end there
+        const double x = a.x() + (y - a.y()) * (b.x() - a.x()) / rise;
+        if ((rise > 0.0) == (area > 0.0)) {
+          right = std::min(right, x);
+        } else {
+          left = std::max(left, x);
+        }
+      }
+      const double at_row = at_first + per_y * (y - c[0].y());
+      for (int x = first_pixel(left, color_.width()), end = last_pixel(right, color_.width()); x <= end; ++x) {
+        const auto nearness = static_cast<float>(at_row + per_x * (x - c[0].x()));
+        if (nearness <= inverse_depth_(x, y)) continue;
+        inverse_depth_(x, y) = nearness;
+        color_(x, y) = color;
+      }
+    }
   }
 
   /// Darkens pixels behind their neighbours (eye-dome lighting: C. Boucheny, "Interactive scientific visualization of
@@ -68,29 +97,12 @@ class picture {
   }
 
  private:
-  void triangle(const vec3& a, const vec3& b, const vec3& c, rgb8 color) {
-    const double area = (b.x() - a.x()) * (c.y() - a.y()) - (b.y() - a.y()) * (c.x() - a.x());
-    if (!(std::abs(area) > 1e-9)) return;
-    const auto pixel = [](double v, int limit) {
-      return static_cast<int>(std::clamp(v, -1.0, static_cast<double>(limit)));
-    };
-    const int x0 = std::max(0, pixel(std::floor(std::min({a.x(), b.x(), c.x()})), color_.width()));
-    const int y0 = std::max(0, pixel(std::floor(std::min({a.y(), b.y(), c.y()})), color_.height()));
-    const int x1 = std::min(color_.width() - 1, pixel(std::ceil(std::max({a.x(), b.x(), c.x()})), color_.width()));
-    const int y1 = std::min(color_.height() - 1, pixel(std::ceil(std::max({a.y(), b.y(), c.y()})), color_.height()));
-    for (int y = y0; y <= y1; ++y)
-      for (int x = x0; x <= x1; ++x) {
-        const double of_a = (b.x() - x) * (c.y() - y) - (b.y() - y) * (c.x() - x);
-        const double of_b = (c.x() - x) * (a.y() - y) - (c.y() - y) * (a.x() - x);
-        if (of_a * area < 0 || of_b * area < 0) continue;  // avoids a division for most pixels
-        const double u = of_a / area, v = of_b / area;
-        const double w = 1.0 - u - v;
-        if (w < 0) continue;
-        const auto nearness = static_cast<float>(u / a.z() + v / b.z() + w / c.z());
-        if (nearness <= inverse_depth_(x, y)) continue;
-        inverse_depth_(x, y) = nearness;
-        color_(x, y) = color;
-      }
+  /// The first pixel at or after the coordinate `v`, and the last one at or before it, in an image of `size` pixels.
+  [[nodiscard]] static int first_pixel(double v, int size) {
+    return static_cast<int>(std::ceil(std::clamp(v, 0.0, static_cast<double>(size))));
+  }
+  [[nodiscard]] static int last_pixel(double v, int size) {
+    return static_cast<int>(std::floor(std::clamp(v, -1.0, size - 1.0)));
   }
 
   /// Returns true if nothing was drawn on the block of averaged pixels that starts at (x, y).
@@ -105,16 +117,13 @@ class picture {
     const float here = inverse_depth_(x, y);
     if (here <= 0.0F) return 1.0;
     constexpr int reach = 2 * oversampling;
-    double behind = 0.0;
+    float behind = 1.0F;
     for (const auto& [dx, dy] : {std::pair{reach, 0}, {-reach, 0}, {0, reach}, {0, -reach}}) {
       if (!inverse_depth_.contains(x + dx, y + dy)) continue;
-      const float there = inverse_depth_(x + dx, y + dy);
-      if (!(there > here)) continue;
-      const float ratio = there / here;
-      constexpr float far = 1.19F;  // above 2^0.25
-      behind += ratio >= far ? 0.25 : std::min(0.25, std::log2(static_cast<double>(ratio)));
+      constexpr float most = 1.1892071F;  // 2^0.25
+      behind *= std::clamp(inverse_depth_(x + dx, y + dy) / here, 1.0F, most);
     }
-    return behind == 0.0 ? 1.0 : std::exp(-6.0 * behind / 4.0);
+    return behind == 1.0F ? 1.0 : std::pow(behind, -2.164F);  // exp(-1.5 log2(behind))
   }
 
   orbis::image_view<rgb8> color_;
