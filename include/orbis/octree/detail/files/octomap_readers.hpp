@@ -120,7 +120,8 @@ class bt_reader : public node_reader {
 };
 
 /// Reads `.ot` nodes. Skips the values of inner nodes, which follow from the leaves. -0 becomes 0.
-class ot_reader : public node_reader {
+template <class = void>
+class basic_ot_reader : public node_reader {
  public:
   /// Reads the node at `level` that starts at `key`, and all nodes below it. On failure returns false and sets
   /// `problem`.
@@ -205,5 +206,6 @@ class ot_reader : public node_reader {
     return true;
   }
 };
+using ot_reader = basic_ot_reader<>;
 
 }  // namespace orbis::octree::detail

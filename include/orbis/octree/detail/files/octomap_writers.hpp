@@ -219,14 +219,15 @@ class bt_writer {
 };
 
 /// Writes `.ot` nodes: the pruned octree with its values.
-class ot_writer {
+template <class = void>
+class basic_ot_writer {
  public:
-  ot_writer(const brick_store<float>& store, int root_level) : store_{store}, root_level_{root_level} {}
+  basic_ot_writer(const brick_store<float>& store, int root_level) : store_{store}, root_level_{root_level} {}
 
   [[nodiscard]] octomap_nodes write() {
     const auto parts = tree_parts(store_, root_level_);
     if (parts.empty()) return {};
-    (void)upper_walk<float, ot_writer>{parts, *this}.walk(root_level_);
+    (void)upper_walk<float, basic_ot_writer>{parts, *this}.walk(root_level_);
     const std::size_t nodes = out_.size() / node_bytes;
     return {std::move(out_), nodes};
   }
@@ -336,5 +337,6 @@ class ot_writer {
   int root_level_;
   node_buffer out_;
 };
+using ot_writer = basic_ot_writer<>;
 
 }  // namespace orbis::octree::detail

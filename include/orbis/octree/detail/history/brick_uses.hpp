@@ -37,7 +37,8 @@ struct used_brick {
 
 /// All bricks observed by scans, and a queue of those with stale octants. A brick without scans is removed when it is
 /// no longer stale; its memory is reused.
-class brick_uses {
+template <class = void>
+class basic_brick_uses {
  public:
   /// Returns the index of a brick, adding the brick if needed; valid until the brick is removed. O(1).
   [[nodiscard]] std::uint32_t find_or_add(std::uint64_t name) {
@@ -99,5 +100,6 @@ class brick_uses {
   std::vector<std::uint32_t> queue_;  ///< indices of the stale bricks, which start at position done_
   std::size_t done_ = 0;
 };
+using brick_uses = basic_brick_uses<>;
 
 }  // namespace orbis::octree::detail

@@ -30,7 +30,8 @@ namespace orbis::octree::detail {
 
 /// Marks the voxels of one scan. The result depends neither on the order of the points nor on the number of threads.
 /// Reuses its memory between scans.
-class point_integrator {
+template <class = void>
+class basic_point_integrator {
  public:
   /// Voxels of the last scan; a voxel both free and occupied counts as occupied.
   [[nodiscard]] const scan_masks& masks() const noexcept { return workers_.front().masks; }
@@ -286,5 +287,6 @@ class point_integrator {
   std::vector<worker> workers_ = std::vector<worker>(1);  ///< never shrinks, so that memory is kept
   std::span<worker> active_;                              ///< workers of the current scan
 };
+using point_integrator = basic_point_integrator<>;
 
 }  // namespace orbis::octree::detail

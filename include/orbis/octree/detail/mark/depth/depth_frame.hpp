@@ -26,7 +26,8 @@ namespace orbis::octree::detail {
 
 /// The view of a depth image: one ray per pixel. Fill `ends` and, for cameras other than pinholes, `map`, and then call
 /// set_scene. See mark_image for the remaining steps.
-struct depth_frame : view_frame {
+template <class = void>
+struct basic_depth_frame : view_frame {
   using sample_kernel = unsigned(const depth_scene&, const endpoint_image&, const child_offsets&, const float3&,
                                  const children&, unsigned);
   using test_kernel = bool(const endpoint_image&, const voxel_test&, const pixel_box&, float,
@@ -84,6 +85,7 @@ struct depth_frame : view_frame {
     return bytes;
   }
 };
+using depth_frame = basic_depth_frame<>;
 
 /// Rays of a depth image for the descent.
 struct depth_rays {

@@ -91,7 +91,8 @@ struct overlap_kernel {
 /// There are three kinds of entries with different definitions of the nearest end. Kind 0: the nearest end of all
 /// pixels, 0 if any pixel has no end. Kind 1: pixels without an end are ignored unless their whole aligned tile of 2x2
 /// pixels has none, which gives 0. Kind 2: as kind 1, with tiles of 4x4 pixels.
-class depth_pyramid {
+template <class = void>
+class basic_depth_pyramid {
  public:
   static constexpr int max_levels = 16;
 
@@ -206,5 +207,6 @@ class depth_pyramid {
   int levels_ = 0;
   float scale_ = 1.0F;
 };
+using depth_pyramid = basic_depth_pyramid<>;
 
 }  // namespace orbis::octree::detail

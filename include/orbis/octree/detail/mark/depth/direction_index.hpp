@@ -22,7 +22,8 @@ namespace orbis::octree::detail {
 /// between their pixels and the affine estimate `focal * (x, y) + center`, and the spacing of the rays. Cells are
 /// combined into larger ones: entry (i, j) of level k represents the cells i, i + 1 of the rows j, j + 1 of 2^k x 2^k
 /// cells each, so that one entry covers any region that is at most one cell of its level wide.
-class direction_index {
+template <class = void>
+class basic_direction_index {
  public:
   static constexpr int max_levels = 16;
   /// Rays further than this from the optical axis, in x or y at z = 1, are excluded.
@@ -279,5 +280,6 @@ class direction_index {
   std::array<std::int32_t, max_levels> begin_{}, width_{}, height_{};
   int levels_ = 0;
 };
+using direction_index = basic_direction_index<>;
 
 }  // namespace orbis::octree::detail

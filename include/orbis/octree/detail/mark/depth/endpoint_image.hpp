@@ -25,7 +25,8 @@
 namespace orbis::octree::detail {
 
 /// End depths of the rays of one depth image, and the voxels that contain ends. Reuses its memory between images.
-class endpoint_image {
+template <class = void>
+class basic_endpoint_image {
  public:
   /// Reads an image: stores the depths at which rays end, and marks the voxels of used ends in `masks` as occupied.
   /// O(pixels). @pre depth and camera have the same size
@@ -178,5 +179,6 @@ class endpoint_image {
   std::size_t stride_ = 0, first_ = 0;
   std::vector<worker> workers_;
 };
+using endpoint_image = basic_endpoint_image<>;
 
 }  // namespace orbis::octree::detail

@@ -19,9 +19,10 @@ namespace orbis::octree::detail {
 
 /// Finds the neighbours of the sensor's voxel through which rays in a range of directions may pass before they leave
 /// this neighbourhood; a ray takes at most one step along each axis there.
-class first_step_order {
+template <class = void>
+class basic_first_step_order {
  public:
-  explicit first_step_order(const depth_sensor& sensor) noexcept
+  explicit basic_first_step_order(const depth_sensor& sensor) noexcept
       : source_{sensor.grid, sensor.pose.centre, *sensor.key} {}
 
   /// Returns these neighbours as a bit mask: bit (dx + 1) + 3 (dy + 1) + 9 (dz + 1) is the voxel at offset (dx, dy,
@@ -86,6 +87,7 @@ class first_step_order {
 
   scan_origin source_;
 };
+using first_step_order = basic_first_step_order<>;
 
 /// Determines which of the 26 neighbours of the sensor's voxel are crossed by rays.
 class first_voxels {

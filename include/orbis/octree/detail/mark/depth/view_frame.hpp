@@ -31,7 +31,8 @@ struct view_extent {
 
 /// A view and the nodes at which its descent starts. Call set_view, build `pyramid`, and then call list_nodes. Reuses
 /// its memory between views.
-struct view_frame {
+template <class = void>
+struct basic_view_frame {
   using classify_kernel = void(const depth_scene&, const child_offsets&, const float3&, bool, children&);
   static constexpr int list_level = 5;  ///< level of the nodes that are distributed to the threads
 
@@ -201,5 +202,6 @@ struct view_frame {
     return {along(scene.x_axis), along(scene.y_axis), along(scene.z_axis)};
   }
 };
+using view_frame = basic_view_frame<>;
 
 }  // namespace orbis::octree::detail

@@ -93,7 +93,8 @@ using place_in_pixels = placed_part(const pixel_placement&, const ray_batch&, st
                                     ray_batch::bits&);
 
 /// Collects the rays of a scan and marks their voxels. Reuses its memory between scans.
-class organised_rays {
+template <class = void>
+class basic_organised_rays {
  public:
   /// Decides whether the scan's points are the pixels of a depth image that is dense enough for this method, and if so
   /// prepares the method. O(1). `limit`: maximum length of rays, metres
@@ -260,5 +261,6 @@ class organised_rays {
   std::vector<std::uint32_t> numbers_;              ///< for each pixel that has a ray, the index of the ray
   std::vector<std::vector<std::uint32_t>> second_;  ///< additional rays of occupied pixels, for each band of rows
 };
+using organised_rays = basic_organised_rays<>;
 
 }  // namespace orbis::octree::detail

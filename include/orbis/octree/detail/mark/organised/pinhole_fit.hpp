@@ -25,7 +25,8 @@ namespace orbis::octree::detail {
 /// is known. Points of one row lie in a plane through the centre, so the rows determine the x axis; the constant
 /// distance between pixels at z = 1 then determines the z axis and the spacing. The result is refined by least squares
 /// (Gauss-Newton). Reads about a thousand points, independent of the cloud's size. Reuses its memory.
-class pinhole_fit {
+template <class = void>
+class basic_pinhole_fit {
  public:
   /// Fits the camera. Returns true if nearly all points are consistent with it. `point(i)`: the i-th of `count` points
   /// as float3; `limit`: maximum length of rays, metres.
@@ -331,5 +332,6 @@ class pinhole_fit {
   double error_ = 0.0, mean_z_ = 0.0, filled_ = 0.0;
   camera::pinhole camera_;
 };
+using pinhole_fit = basic_pinhole_fit<>;
 
 }  // namespace orbis::octree::detail

@@ -167,6 +167,7 @@ struct fresh_hits_kernel {
 };
 
 using fresh_kernel = void(const ray_batch&, std::size_t, ray_batch::bits&);
+template <class = void>
 [[nodiscard]] inline fresh_kernel* find_fresh_hits() noexcept {
   return simd::kernel<fresh_hits_kernel, fresh_kernel>();
 }
@@ -175,6 +176,9 @@ using limit_kernel = void(const ray_frame&, const point_batch&, double, std::siz
 
 /// Computes the rays to `count` points, limited to a length in metres. There is no ray to an end outside the grid.
 /// @pre points are readable up to the next multiple of 16; the limit is not negative
-[[nodiscard]] inline limit_kernel* limit_rays() noexcept { return simd::kernel<limit_rays_kernel, limit_kernel>(); }
+template <class = void>
+[[nodiscard]] inline limit_kernel* limit_rays() noexcept {
+  return simd::kernel<limit_rays_kernel, limit_kernel>();
+}
 
 }  // namespace orbis::octree::detail

@@ -197,6 +197,7 @@ using crossings_kernel = void(const plane_stack&, queued_rays&, std::size_t, std
 /// Marks the rays [begin, end) in a stack of planes. If the arithmetic cannot decide a cell or an order with certainty,
 /// the ray is appended to `doubtful` and removed (planes = -1); its existing marks are correct. @pre the cells of the
 /// rays are in the stack
+template <class = void>
 [[nodiscard]] inline crossings_kernel* mark_crossings() noexcept {
   return simd::kernel<mark_crossings_kernel, crossings_kernel>();
 }

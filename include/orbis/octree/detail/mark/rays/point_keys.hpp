@@ -53,6 +53,7 @@ struct load_triples_kernel {
 };
 
 /// Loads the points [begin, begin + count).
+template <class = void>
 inline void load_points(const point_view& points, std::size_t begin, std::size_t count, point_batch& batch) noexcept {
   auto* const load_triples = simd::kernel<load_triples_kernel, void(const float*, std::size_t, point_batch&)>();
   load_triples(points.xyz + 3 * begin, count, batch);
@@ -155,6 +156,7 @@ struct find_keys_kernel {
 };
 
 /// Finds the voxels of the first `count` points. @pre the arrays of `points` are readable up to the next multiple of 16
+template <class = void>
 inline void find_keys(const voxel_grid& grid, const point_batch& points, std::size_t count, batch_keys& keys) noexcept {
   using signature = void(const voxel_grid&, const point_batch&, std::size_t, batch_keys&);
   simd::kernel<find_keys_kernel, signature>()(grid, points, count, keys);

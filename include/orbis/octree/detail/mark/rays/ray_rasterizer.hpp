@@ -29,7 +29,8 @@ namespace orbis::octree::detail {
 
 /// Collects the rays of one scan and marks their voxels. Reuses its memory between scans: a few megabytes, independent
 /// of the length of the rays.
-class ray_rasterizer {
+template <class = void>
+class basic_ray_rasterizer {
  public:
   /// Starts a scan from `origin` in voxel `from`.
   void start(const voxel_grid& grid, const float3& origin, const voxel_key& from) {
@@ -293,5 +294,6 @@ class ray_rasterizer {
   setup_kernel* set_up_ = nullptr;
   crossings_kernel* mark_crossings_ = nullptr;
 };
+using ray_rasterizer = basic_ray_rasterizer<>;
 
 }  // namespace orbis::octree::detail

@@ -168,6 +168,9 @@ struct set_up_rays_kernel {
 using setup_kernel = void(const scan_origin&, const ray_batch&, std::size_t, ray_setup&);
 
 /// Sets up eight rays of a batch, starting with the i-th.
-[[nodiscard]] inline setup_kernel* set_up_rays() noexcept { return simd::kernel<set_up_rays_kernel, setup_kernel>(); }
+template <class = void>
+[[nodiscard]] inline setup_kernel* set_up_rays() noexcept {
+  return simd::kernel<set_up_rays_kernel, setup_kernel>();
+}
 
 }  // namespace orbis::octree::detail

@@ -14,9 +14,10 @@ namespace orbis::octree::detail {
 /// Takes the same steps as `ray_traversal`, but can cross a whole node at once. The parameters of the next steps along
 /// each axis are precomputed in the same order of summation, so that the number of steps up to a node's face is found
 /// by a look-up instead of by stepping.
-class skipping_traversal {
+template <class = void>
+class basic_skipping_traversal {
  public:
-  explicit skipping_traversal(const ray_traversal& c) noexcept
+  explicit basic_skipping_traversal(const ray_traversal& c) noexcept
       : at_{c.at}, step_{c.step}, delta_{c.delta}, cells_{c.cells} {
     for (std::size_t i = 0; i != 3; ++i) per_step_[i] = step_[i] == 0 ? 0.0 : 1.0 / delta_[i];
     sum_up(c.next[0], c.next[1], c.next[2]);
@@ -107,5 +108,6 @@ class skipping_traversal {
   std::uint32_t cells_;
   std::array<std::array<double, count>, 3> ahead_;
 };
+using skipping_traversal = basic_skipping_traversal<>;
 
 }  // namespace orbis::octree::detail

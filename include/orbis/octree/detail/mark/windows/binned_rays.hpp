@@ -129,7 +129,8 @@ struct place_rays_kernel {
 using place_kernel = void(const window_tables&, const ray_batch&, std::size_t, std::uint32_t, binned_ray*, ray_places&);
 
 /// Sorts the rays of a scan by the cells of its windows. Reuses its memory between scans.
-class binned_rays {
+template <class = void>
+class basic_binned_rays {
  public:
   static constexpr std::size_t most_rays = std::size_t{1} << 24U;
   /// Maximum number of rays per cell and worker, to limit the number of rays to test per voxel.
@@ -245,5 +246,6 @@ class binned_rays {
   std::vector<std::int32_t> deepest_;
   std::vector<worker_bins> bins_;
 };
+using binned_rays = basic_binned_rays<>;
 
 }  // namespace orbis::octree::detail

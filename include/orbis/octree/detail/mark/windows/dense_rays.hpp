@@ -27,7 +27,8 @@
 namespace orbis::octree::detail {
 
 /// One window of a scan, prepared for the descent.
-struct window_frame : view_frame {
+template <class = void>
+struct basic_window_frame : view_frame {
   using sample_kernel = unsigned(const depth_scene&, const window_rays&, const child_offsets&, const float3&,
                                  const children&, unsigned);
   using test_kernel = bool(const depth_scene&, const window_rays&, const voxel_test&, const pixel_box&, float,
@@ -55,6 +56,7 @@ struct window_frame : view_frame {
   /// Maximum distance of a ray from the centre of its cell, in cells.
   [[nodiscard]] float room() const noexcept { return 0.51F + 4e-6F * scene.fx; }
 };
+using window_frame = basic_window_frame<>;
 
 /// Rays of a window for the descent, see depth_rays. `EndOf`: returns the ray_endpoint of a ray.
 template <class EndOf>
@@ -80,7 +82,8 @@ struct cell_rays {
 };
 
 /// Collects the rays of a scan and marks their voxels. Reuses its memory between scans.
-class dense_rays {
+template <class = void>
+class basic_dense_rays {
  public:
   /// Decides from a sample of the scan's points whether the rays are dense enough for this method, and if so prepares
   /// it. O(1). `limit`: maximum length of rays, metres
@@ -194,5 +197,6 @@ class dense_rays {
   std::array<window_frame, direction_windows::faces> frames_;
   std::vector<descent_worker> workers_;
 };
+using dense_rays = basic_dense_rays<>;
 
 }  // namespace orbis::octree::detail

@@ -37,7 +37,8 @@ struct sampled_rays {
 
 /// Windows that contain nearly all of a scan's rays. The cube is rotated so that the rays of a camera pass through the
 /// middle of one face, with the image sides parallel to the sides of the face.
-struct direction_windows {
+template <class = void>
+struct basic_direction_windows {
   static constexpr std::size_t faces = 6;
   static constexpr std::uint32_t most_cells = 1U << 22U;
 
@@ -129,5 +130,6 @@ struct direction_windows {
     return turned;
   }
 };
+using direction_windows = basic_direction_windows<>;
 
 }  // namespace orbis::octree::detail
