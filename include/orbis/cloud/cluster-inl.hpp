@@ -105,9 +105,10 @@ namespace detail {
 /// Disjoint sets that several threads can join concurrently. The root of a set is its smallest element, independent of
 /// the order of joins.
 /// Source: R. J. Anderson, H. Woll, "Wait-free parallel algorithms for the union-find problem", STOC 1991.
-class disjoint_sets {
+template <class = void>
+class basic_disjoint_sets {
  public:
-  explicit disjoint_sets(std::size_t count) : parent_(count) {
+  explicit basic_disjoint_sets(std::size_t count) : parent_(count) {
     for (std::size_t i = 0; i != count; ++i) parent_[i] = static_cast<std::uint32_t>(i);
   }
   void join(std::uint32_t a, std::uint32_t b) noexcept {
@@ -141,6 +142,7 @@ class disjoint_sets {
   [[nodiscard]] std::atomic_ref<std::uint32_t> at(std::uint32_t i) noexcept { return std::atomic_ref{parent_[i]}; }
   std::vector<std::uint32_t> parent_;
 };
+using disjoint_sets = basic_disjoint_sets<>;
 
 [[nodiscard]] inline std::size_t smallest_large(const cluster_options& options, std::size_t points) noexcept {
   if (options.min_size != 0) return options.min_size;

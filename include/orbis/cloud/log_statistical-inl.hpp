@@ -14,8 +14,8 @@
 
 namespace orbis::cloud {
 
-ORBIS_INLINE log_statistical_result log_statistical_decision(std::vector<float> mean_distance,
-                                                             const log_statistical_options& options) {
+ORBIS_LAZY_INLINE log_statistical_result log_statistical_decision(std::vector<float> mean_distance,
+                                                                  const log_statistical_options& options) {
   log_statistical_result out;
   std::vector<float> values;
   values.reserve(mean_distance.size());

@@ -16,6 +16,7 @@
 #include <orbis/cloud/detail/point_view.hpp>
 #include <orbis/cloud/extract.hpp>
 #include <orbis/core/execution.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/core/point.hpp>
 
 namespace orbis::cloud {
@@ -38,8 +39,8 @@ struct log_statistical_result {
 
 /// Classifies points by known mean distances, see `log_statistical_inliers`. `non_finite` applies to points without a
 /// mean distance (NaN). O(n).
-[[nodiscard]] log_statistical_result log_statistical_decision(std::vector<float> mean_distance,
-                                                              const log_statistical_options& options = {});
+ORBIS_LAZY [[nodiscard]] log_statistical_result log_statistical_decision(std::vector<float> mean_distance,
+                                                                         const log_statistical_options& options = {});
 
 namespace detail {
 

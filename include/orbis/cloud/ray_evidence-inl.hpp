@@ -49,8 +49,8 @@ std::vector<ray_evidence> ray_evidence_scores(const Policy& policy, const Points
   });
 }
 
-ORBIS_INLINE ray_evidence_result ray_evidence_decision(std::vector<ray_evidence> scores,
-                                                       const ray_evidence_options& options) {
+ORBIS_LAZY_INLINE ray_evidence_result ray_evidence_decision(std::vector<ray_evidence> scores,
+                                                            const ray_evidence_options& options) {
   ray_evidence_result out;
   for (std::size_t i = 0; i != scores.size(); ++i) {
     if (!is_passed_through(scores[i], options)) out.inliers.push_back(static_cast<std::uint32_t>(i));

@@ -19,6 +19,7 @@
 #include <orbis/camera/model.hpp>
 #include <orbis/cloud/ray_evidence_counter.hpp>
 #include <orbis/core/execution.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/core/point.hpp>
 
 namespace orbis::cloud {
@@ -60,8 +61,8 @@ struct ray_evidence_result {
 }
 
 /// Classifies points by known counts. Points without counts are inliers. O(n).
-[[nodiscard]] ray_evidence_result ray_evidence_decision(std::vector<ray_evidence> scores,
-                                                        const ray_evidence_options& options = {});
+ORBIS_LAZY [[nodiscard]] ray_evidence_result ray_evidence_decision(std::vector<ray_evidence> scores,
+                                                                   const ray_evidence_options& options = {});
 
 /// Returns the indices, ascending, of the finite points that rays do not pass through. See `ray_evidence_scores`, which
 /// also describes `on_progress`.

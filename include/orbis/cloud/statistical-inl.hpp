@@ -14,8 +14,8 @@
 
 namespace orbis::cloud {
 
-ORBIS_INLINE statistical_result statistical_decision(std::vector<float> mean_distance,
-                                                     const statistical_options& options) {
+ORBIS_LAZY_INLINE statistical_result statistical_decision(std::vector<float> mean_distance,
+                                                          const statistical_options& options) {
   constexpr double infinity = std::numeric_limits<double>::infinity();
   double sum = 0;
   double sum_of_squares = 0;
@@ -42,9 +42,9 @@ ORBIS_INLINE statistical_result statistical_decision(std::vector<float> mean_dis
   return out;
 }
 
-ORBIS_INLINE range_statistical_result range_statistical_decision(std::span<const float> mean_distance,
-                                                                 std::span<const float> ranges,
-                                                                 const range_statistical_options& options) {
+ORBIS_LAZY_INLINE range_statistical_result range_statistical_decision(std::span<const float> mean_distance,
+                                                                      std::span<const float> ranges,
+                                                                      const range_statistical_options& options) {
   assert(ranges.size() == mean_distance.size());
   assert(options.angle >= 0 && options.noise >= 0 && options.angle + options.noise > 0 && options.least_range > 0);
   range_statistical_result out;

@@ -28,6 +28,7 @@
 #include <orbis/cloud/extract.hpp>
 #include <orbis/cloud/sensor_origins.hpp>
 #include <orbis/core/execution.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/core/point.hpp>
 
 namespace orbis::cloud {
@@ -54,8 +55,8 @@ struct statistical_result {
 /// equal. The spread of such a cloud cannot be measured: sigma is then reported as 0 and the threshold as infinite, and
 /// all points are kept (as in PCL, where both are NaN and no distance is larger). If distances or their squares
 /// overflow, sigma is infinite and all points are kept as well.
-[[nodiscard]] statistical_result statistical_decision(std::vector<float> mean_distance,
-                                                      const statistical_options& options = {});
+ORBIS_LAZY [[nodiscard]] statistical_result statistical_decision(std::vector<float> mean_distance,
+                                                                 const statistical_options& options = {});
 
 namespace detail {
 
@@ -120,9 +121,8 @@ struct range_statistical_result {
 /// Classifies points by known mean distances and ranges, see `range_statistical_inliers`. `non_finite` applies to
 /// points without a mean distance (NaN); points that lack only the range are kept. O(n).
 /// @pre ranges is as long as mean_distance; angle >= 0, noise >= 0 and not both zero; least_range > 0
-[[nodiscard]] range_statistical_result range_statistical_decision(std::span<const float> mean_distance,
-                                                                  std::span<const float> ranges,
-                                                                  const range_statistical_options& options = {});
+ORBIS_LAZY [[nodiscard]] range_statistical_result range_statistical_decision(
+    std::span<const float> mean_distance, std::span<const float> ranges, const range_statistical_options& options = {});
 
 namespace detail {
 

@@ -535,7 +535,8 @@ struct gather_leaves {
 };
 
 /// The loops, compiled for the best available instruction set.
-struct knn_kernels {
+template <class = void>
+struct basic_knn_kernels {
   using point = std::array<float, 3>;
   using boxes_code = std::uint32_t(const box_axes&, const box3&, float, float*);
   using gather_code = void(const box_row&, std::uint32_t, std::uint32_t, nearby_leaves&);
@@ -573,5 +574,6 @@ struct knn_kernels {
     return out;
   }
 };
+using knn_kernels = basic_knn_kernels<>;
 
 }  // namespace orbis::cloud::detail

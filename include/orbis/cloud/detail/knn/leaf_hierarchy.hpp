@@ -95,7 +95,8 @@ struct fill_curve_keys {
 /// share a cell, they are ordered recursively along a finer curve within it. The leaves thus adapt to any uneven
 /// density. Each level divides the extent by about a thousand, and the range of float allows 28 levels: O(n) on typical
 /// clouds, at most 28 times as long otherwise.
-class leaf_order {
+template <class = void>
+class basic_leaf_order {
  public:
   struct entry {
     std::uint32_t key;
@@ -109,7 +110,8 @@ class leaf_order {
   /// Orders the finite points. Of identical points in a crowded cell, only `most_copies` are kept, because a search
   /// needs no more. `there`: for each point, nonzero to include it; empty to include all.
   template <execution_policy Policy>
-  leaf_order(const Policy& policy, const point_view& points, std::size_t most_copies, std::span<const char> there = {})
+  basic_leaf_order(const Policy& policy, const point_view& points, std::size_t most_copies,
+                   std::span<const char> there = {})
       : points_{points}, most_copies_{most_copies} {
     const auto count = static_cast<std::uint32_t>(points.size());
     const auto counts = [&](std::uint32_t i) { return (there.empty() || there[i] != 0) && is_finite(position(i)); };
@@ -215,6 +217,7 @@ class leaf_order {
   std::vector<entry> spare_;
   std::vector<range> left_out_;
 };
+using leaf_order = basic_leaf_order<>;
 
 /// A point that is in no leaf because the leaves hold enough identical points.
 struct surplus_copy {

@@ -27,6 +27,7 @@ struct open_row {
 
 /// Gathers the leaves (`level` 0), or the rows of the level below `level`, that are within squared distance `bound` of
 /// `box`. Returns false if there are too many. `open` is scratch.
+template <class = void>
 [[nodiscard]] inline bool gather_near(const leaf_hierarchy& tree, std::uint32_t level, const knn_kernels& kernels,
                                       const box3& box, float bound, std::vector<open_row>& open, nearby_leaves& near) {
   near.count = 0;
@@ -93,13 +94,14 @@ void for_each_within(const leaf_hierarchy& tree, const knn_kernels& kernels, con
 ///
 /// Source of the search in ascending order of box distance: G. R. Hjaltason, H. Samet, "Distance browsing in spatial
 /// databases", ACM TODS 24, 1999.
-class nearest_search {
+template <class = void>
+class basic_nearest_search {
  public:
   /// Prepares a search. `with_places`: also record the places of the found points. `most_near_rows`: maximum number of
   /// rows of leaves shared by the leaves of a row; affects speed only.
   /// @pre 0 < wanted <= points in the leaves
-  nearest_search(const leaf_hierarchy& tree, const knn_kernels& kernels, std::size_t wanted, bool with_places = false,
-                 std::size_t most_near_rows = 128)
+  basic_nearest_search(const leaf_hierarchy& tree, const knn_kernels& kernels, std::size_t wanted,
+                       bool with_places = false, std::size_t most_near_rows = 128)
       : tree_{&tree},
         kernels_{kernels},
         wanted_{wanted},
@@ -402,5 +404,6 @@ class nearest_search {
   float shared_reach_ = -1;  ///< `shared_` contains all points within this squared distance of the run's box
   float usual_ = -1;         ///< squared distance to the `wanted`-th nearest; negative if not yet known
 };
+using nearest_search = basic_nearest_search<>;
 
 }  // namespace orbis::cloud::detail

@@ -33,14 +33,15 @@ namespace orbis::cloud::detail {
 /// byte: the position of its leaf in the list, and its own position in the leaf. With more than 16 listed leaves a
 /// neighbour takes two bytes; with more than 256 it is encoded as a place. Distances are recomputed. Takes about k + 3
 /// bytes per point on a surface, and 18 for the point's position and index; a `neighbor_table` takes 8 k.
-class neighbor_graph {
+template <class = void>
+class basic_neighbor_graph {
  public:
-  neighbor_graph() = default;
+  basic_neighbor_graph() = default;
   /// Finds the `min(k, points - 1)` nearest other points of every point of `tree`. O(n k log k); the result is the same
   /// for every policy. Takes 4 bytes per point of the cloud during construction. @pre k > 0; `tree` keeps k + 1
   /// copies of identical points; its indices are less than `count`
   template <execution_policy Policy>
-  neighbor_graph(const Policy& policy, leaf_hierarchy tree, std::size_t count, std::size_t k)
+  basic_neighbor_graph(const Policy& policy, leaf_hierarchy tree, std::size_t count, std::size_t k)
       : tree_{std::move(tree)}, width_{std::min(k, std::max<std::size_t>(tree_.finite, 1) - 1)} {
     assert(k > 0);
     if (width_ == 0) return;
@@ -208,5 +209,6 @@ class neighbor_graph {
   std::vector<std::uint32_t> start_;              ///< for each leaf, the position of its rows in its chunk's words
   std::vector<std::vector<std::uint32_t>> rows_;  ///< encoded rows, one vector of words per chunk of leaves
 };
+using neighbor_graph = basic_neighbor_graph<>;
 
 }  // namespace orbis::cloud::detail

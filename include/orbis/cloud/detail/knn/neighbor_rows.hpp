@@ -49,7 +49,8 @@ struct find_ranks {
 };
 
 /// Sorts points by squared distance, then by index. Reuses its memory.
-class rank_sorter {
+template <class = void>
+class basic_rank_sorter {
  public:
   void clear() noexcept { count_ = 0; }
   [[nodiscard]] std::size_t size() const noexcept { return count_; }
@@ -121,6 +122,7 @@ class rank_sorter {
   std::vector<std::int32_t> ranks_;
   std::vector<std::uint64_t> sorted_;
 };
+using rank_sorter = basic_rank_sorter<>;
 
 /// Writes the nearest gathered points, excluding the point itself, as a row. Returns the squared distance to the last
 /// one.

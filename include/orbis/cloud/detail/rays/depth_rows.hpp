@@ -58,7 +58,8 @@ struct stored_to_metres {
 };
 
 /// The loops, compiled for the best available instruction set. AVX-512 brings no gain: memory is the bottleneck.
-struct depth_row_kernels {
+template <class = void>
+struct basic_depth_row_kernels {
   void (*widen_range)(float*, float*, const float*, const float*, std::size_t) =
       simd::kernel<detail::widen_range, void(float*, float*, const float*, const float*, std::size_t), simd::avx2>();
   void (*replace_zeros)(float*, float, std::size_t) =
@@ -66,6 +67,7 @@ struct depth_row_kernels {
   void (*to_metres)(const std::uint16_t*, double, float, float, float*, std::size_t) = simd::kernel<
       stored_to_metres, void(const std::uint16_t*, double, float, float, float*, std::size_t), simd::avx2>();
 };
+using depth_row_kernels = basic_depth_row_kernels<>;
 
 /// Reads a row of any depth image in metres; 0 where depth is missing.
 template <camera::depth_source Depth>

@@ -164,7 +164,8 @@ struct count_points {
 };
 
 /// The loops, compiled for the best available instruction set.
-struct ray_kernels {
+template <class = void>
+struct basic_ray_kernels {
   void (*locate)(const ray_view&, const block_axes&, seen_block&) =
       simd::kernel<locate_in_pinhole, void(const ray_view&, const block_axes&, seen_block&)>();
   void (*judge)(const ray_view&, const seen_block&, block_verdict&) =
@@ -174,5 +175,6 @@ struct ray_kernels {
   void (*take_back)(const std::array<std::uint16_t, block_verdict::words>&, std::uint16_t*) =
       simd::kernel<count_points<false>, void(const std::array<std::uint16_t, block_verdict::words>&, std::uint16_t*)>();
 };
+using ray_kernels = basic_ray_kernels<>;
 
 }  // namespace orbis::cloud::detail

@@ -164,7 +164,8 @@ struct view_verdict {
 /// Verdicts that involve one view. With up to 128 views, all are kept. Of more than `most` verdicts, those with the
 /// lowest ranks are kept, which are an unbiased sample. Memory thus grows linearly with the number of views, and a view
 /// that overlaps with few others loses no verdicts.
-class view_verdicts {
+template <class = void>
+class basic_view_verdicts {
  public:
   static constexpr std::size_t most = std::size_t{128} * 2 * 16;  ///< 128 views, 16 tiles of each and of this view
 
@@ -186,6 +187,7 @@ class view_verdicts {
   [[nodiscard]] static bool lower(const view_verdict& a, const view_verdict& b) noexcept { return a.rank < b.rank; }
   std::vector<view_verdict> kept_;  // a heap with the highest rank in front once it is full
 };
+using view_verdicts = basic_view_verdicts<>;
 
 /// Median of the conflicts of a view with the views that are not left out; 0 if there are too few. `verdicts`: the
 /// verdicts that involve the view.

@@ -81,7 +81,8 @@ class sparse_values {
 /// The remaining points of a cloud with their neighbours. Points are identified by the places of a `neighbor_graph`;
 /// all data are indexed by place. Log spacings are NaN for single points and for points identical to all their
 /// neighbours. About 45 bytes per point.
-class surroundings {
+template <class = void>
+class basic_surroundings {
  public:
   static constexpr std::size_t width = 12;       ///< number of neighbours in the graph; increased if more are averaged
   static constexpr std::size_t shape_width = 8;  ///< number of neighbours that determine the shape
@@ -91,8 +92,8 @@ class surroundings {
   /// `ranges`: for each point of the cloud, metres, non-finite or negative if unknown; empty if all are unknown. The
   /// ranges must outlive this object.
   template <execution_policy Policy>
-  surroundings(const Policy& policy, const point_view& points, std::span<const char> left,
-               std::span<const float> ranges, std::size_t neighbors)
+  basic_surroundings(const Policy& policy, const point_view& points, std::span<const char> left,
+                     std::span<const float> ranges, std::size_t neighbors)
       : ranges_{ranges} {
     const std::size_t most_copies = std::min(std::max(width, neighbors), left.size()) + 1;
     measure(policy, make_leaves(policy, points, most_copies, left), left.size(), neighbors);
@@ -242,5 +243,6 @@ class surroundings {
   sparse_values flat_;        ///< `off_plane` of the analysed points
   std::vector<char> gone_;
 };
+using surroundings = basic_surroundings<>;
 
 }  // namespace orbis::cloud::detail

@@ -57,7 +57,8 @@ struct voxel_sum {
 };
 
 /// The occupied voxels of a brick, in the order of their cells.
-class voxel_brick {
+template <class = void>
+class basic_voxel_brick {
  public:
   /// Number of occupied voxels.
   [[nodiscard]] std::size_t size() const noexcept {
@@ -171,5 +172,6 @@ class voxel_brick {
   std::array<std::uint16_t, 8> before_{};  ///< number of cells before each word of the mask
   std::vector<voxel_sum> sums_;
 };
+using voxel_brick = basic_voxel_brick<>;
 
 }  // namespace orbis::cloud::detail
