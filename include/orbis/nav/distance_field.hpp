@@ -317,6 +317,7 @@ class distance_field : public metric_distances<squared_distances> {
   }
   /// Volume of a node in voxels.
   [[nodiscard]] static std::uint64_t volume(int level) noexcept { return std::uint64_t{1} << (3 * level); }
+  template <class = void>
   void apply() {
     voxels_.update(octants_);
     // Keep the capacity that typical updates need, so that they allocate nothing.

@@ -15,7 +15,7 @@
 
 namespace orbis::nav {
 
-ORBIS_INLINE image<float> squared_floor_distances(const image<floor_state>& states) {
+ORBIS_LAZY_INLINE image<float> squared_floor_distances(const image<floor_state>& states) {
   constexpr float far = 1e18F;
   image<float> squared(states.width(), states.height(), far);
   const int width = states.width(), height = states.height();
@@ -66,7 +66,7 @@ ORBIS_INLINE image<float> squared_floor_distances(const image<floor_state>& stat
   return squared;
 }
 
-ORBIS_INLINE image<std::uint8_t> inflate(const floor_map& map, const inflation_options& options) {
+ORBIS_LAZY_INLINE image<std::uint8_t> inflate(const floor_map& map, const inflation_options& options) {
   assert(options.radius >= 0.0 && options.cost_scaling >= 0.0);
   const image<float> squared = squared_floor_distances(map.states);
   const double rounding = 1e-9 * map.resolution;  // three cells of 0.05 m must count as 0.15 m

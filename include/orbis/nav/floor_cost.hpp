@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include <orbis/core/image.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/nav/floor_map.hpp>
 
 namespace orbis::nav {
@@ -28,14 +29,14 @@ struct inflation_options {
 /// cell is occupied. Exact up to 4096 cells; larger distances are rounded to float. O(cells).
 ///
 /// P. Felzenszwalb, D. Huttenlocher, "Distance transforms of sampled functions", Theory of Computing 8, 2012.
-[[nodiscard]] image<float> squared_floor_distances(const image<floor_state>& states);
+ORBIS_LAZY [[nodiscard]] image<float> squared_floor_distances(const image<floor_state>& states);
 
 /// The costs of the cells of a floor map according to Nav2's rule: 254 in obstacles; 253 where the robot's circle
 /// touches an obstacle (the cell centres are at most `radius` apart); 252 exp(-cost_scaling (d - radius)), rounded
 /// down, up to the inflation radius; 0 farther away; and 255 in unknown cells, unless an obstacle is within `radius`.
 /// O(cells).
 /// @pre 0 <= radius; cost_scaling >= 0
-[[nodiscard]] image<std::uint8_t> inflate(const floor_map& map, const inflation_options& options = {});
+ORBIS_LAZY [[nodiscard]] image<std::uint8_t> inflate(const floor_map& map, const inflation_options& options = {});
 
 }  // namespace orbis::nav
 

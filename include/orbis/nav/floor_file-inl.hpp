@@ -17,7 +17,7 @@
 
 namespace orbis::nav {
 
-ORBIS_INLINE result<void> save_floor_map(const std::filesystem::path& path, const floor_map& map) {
+ORBIS_LAZY_INLINE result<void> save_floor_map(const std::filesystem::path& path, const floor_map& map) {
   const auto fits = [&](double number) { return std::isfinite(number); };
   if (!path.has_filename()) return fail(errc::invalid_argument, path.string(), "has no file name; pass a .yaml file");
   if (map.states.empty() || !fits(map.origin.x()) || !fits(map.origin.y()) ||

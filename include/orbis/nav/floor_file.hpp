@@ -5,6 +5,7 @@
 
 #include <filesystem>
 
+#include <orbis/core/inline.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/nav/floor_map.hpp>
 
@@ -16,7 +17,7 @@ namespace orbis::nav {
 /// cells would be read as free. Each file is replaced atomically, the image first. Errors: write_failed,
 /// invalid_argument (no file name, or one that ends in .pgm or contains a quotation mark, a backslash or a control
 /// character; an empty map, or one whose origin or resolution is not finite; in these cases nothing is written).
-[[nodiscard]] result<void> save_floor_map(const std::filesystem::path& path, const floor_map& map);
+ORBIS_LAZY [[nodiscard]] result<void> save_floor_map(const std::filesystem::path& path, const floor_map& map);
 
 }  // namespace orbis::nav
 

@@ -83,13 +83,15 @@ void spread_extremes(image<int>& values, int radius, int nothing, const Extreme&
 }
 
 /// The surfaces in all columns, and those that a robot can reach.
-class floor_search {
+template <class = void>
+class basic_floor_search {
  public:
   static constexpr int none = no_level;
 
   /// Levels are relative to `columns`; `lowest` and `highest`: range of the surface levels; `clear` and `step`: in
   /// voxels.
-  floor_search(const voxel_columns& columns, int lowest, int highest, int clear, int step, octree::occupancy unknown)
+  basic_floor_search(const voxel_columns& columns, int lowest, int highest, int clear, int step,
+                     octree::occupancy unknown)
       : columns_{columns},
         lowest_{lowest},
         highest_{highest},
@@ -276,6 +278,7 @@ class floor_search {
   image<int> levels_;
   image<int> low_{}, high_{};  ///< extremes of the levels within the radius
 };
+using floor_search = basic_floor_search<>;
 
 }  // namespace detail
 

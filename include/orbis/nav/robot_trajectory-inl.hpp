@@ -10,8 +10,8 @@
 
 namespace orbis::nav {
 
-ORBIS_INLINE robot_trajectory::robot_trajectory(const vec3& start, std::vector<path_piece> pieces,
-                                                const std::vector<bool>& stops, const motion_limits& limits)
+ORBIS_LAZY_INLINE robot_trajectory::robot_trajectory(const vec3& start, std::vector<path_piece> pieces,
+                                                     const std::vector<bool>& stops, const motion_limits& limits)
     : start_{start}, end_{start}, pieces_{std::move(pieces)} {
   assert(stops.size() == pieces_.size());
   assert(limits.speed > 0.0 && std::isfinite(limits.speed));
@@ -20,7 +20,7 @@ ORBIS_INLINE robot_trajectory::robot_trajectory(const vec3& start, std::vector<p
   set_times(limits, stops);
 }
 
-ORBIS_INLINE motion_state robot_trajectory::at(double time) const {
+ORBIS_LAZY_INLINE motion_state robot_trajectory::at(double time) const {
   if (!(time > 0.0) || knots_.empty()) return {start_};
   if (time >= duration()) return {end_};
   const auto after =
@@ -34,7 +34,7 @@ ORBIS_INLINE motion_state robot_trajectory::at(double time) const {
   return {piece.position(s), ds * q1, k.gain * q1 + ds * ds * piece.second(s)};
 }
 
-ORBIS_INLINE void robot_trajectory::set_times(const motion_limits& limits, const std::vector<bool>& stops) {
+ORBIS_LAZY_INLINE void robot_trajectory::set_times(const motion_limits& limits, const std::vector<bool>& stops) {
   struct interval {
     std::size_t piece;
     double s, length, a, b;

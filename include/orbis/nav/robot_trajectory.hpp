@@ -17,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include <orbis/core/inline.hpp>
 #include <orbis/core/types.hpp>
 #include <orbis/nav/planning_space.hpp>
 
@@ -76,13 +77,13 @@ class robot_trajectory {
  public:
   /// A trajectory along consecutive pieces, as fast as the limits allow. `stops[i]`: true to stop at the start of piece
   /// i. `start`: the position if there are no pieces. @pre stops.size() == pieces.size(); limits finite and > 0
-  robot_trajectory(const vec3& start, std::vector<path_piece> pieces, const std::vector<bool>& stops,
-                   const motion_limits& limits);
+  ORBIS_LAZY robot_trajectory(const vec3& start, std::vector<path_piece> pieces, const std::vector<bool>& stops,
+                              const motion_limits& limits);
 
   /// Duration in seconds.
   [[nodiscard]] double duration() const noexcept { return knots_.empty() ? 0.0 : knots_.back().time; }
   /// The state at `time` seconds; at rest before 0 and after `duration()`. O(log n)
-  [[nodiscard]] motion_state at(double time) const;
+  ORBIS_LAZY [[nodiscard]] motion_state at(double time) const;
   /// The lines and corners of the trajectory.
   [[nodiscard]] const std::vector<path_piece>& pieces() const noexcept { return pieces_; }
   /// Number of stops between start and end.
@@ -106,7 +107,7 @@ class robot_trajectory {
   /// so that u at one end bounds u at the other. One forward and one backward pass compute u, as in J. E. Bobrow, S.
   /// Dubowsky, J. S. Gibson, "Time-optimal control of robotic manipulators along specified paths", International
   /// Journal of Robotics Research 4(3), 1985. `stops`: the pieces at whose start the robot stops.
-  void set_times(const motion_limits& limits, const std::vector<bool>& stops);
+  ORBIS_LAZY void set_times(const motion_limits& limits, const std::vector<bool>& stops);
 
   vec3 start_ = zeros<vec3>(), end_ = zeros<vec3>();
   std::vector<path_piece> pieces_;

@@ -13,7 +13,7 @@
 
 namespace orbis::nav {
 
-ORBIS_INLINE squared_distances::squared_distances(int reach, std::uint32_t cells, bool elsewhere_is_obstacle)
+ORBIS_LAZY_INLINE squared_distances::squared_distances(int reach, std::uint32_t cells, bool elsewhere_is_obstacle)
     : squared_distance_view{reach, cells, elsewhere_is_obstacle},
       kernels_{detail::best_slice_code()},
       bricks_in_reach_{(reach + 7) / 8},
@@ -33,13 +33,13 @@ ORBIS_INLINE squared_distances::squared_distances(int reach, std::uint32_t cells
     }
 }
 
-ORBIS_INLINE std::uint64_t squared_distances::max_added_bricks(const voxel_cube& cube) const noexcept {
+ORBIS_LAZY_INLINE std::uint64_t squared_distances::max_added_bricks(const voxel_cube& cube) const noexcept {
   const auto volume = [](std::int64_t edge) { return edge <= 0 ? 0 : static_cast<std::uint64_t>(edge * edge * edge); };
   const std::int64_t edge = std::int64_t{octree::node_cells(cube.level)} / 8, reach = bricks_in_reach_;
   return elsewhere_ == 0 ? volume(edge) - volume(edge - 2 * reach) : volume(edge + 2 * reach) - volume(edge);
 }
 
-ORBIS_INLINE void squared_distances::begin(std::span<const voxel_cube> cubes) {
+ORBIS_LAZY_INLINE void squared_distances::begin(std::span<const voxel_cube> cubes) {
   assert(stages_.empty() && !has_cubes());
   begin_update();
   for (const voxel_cube& c : cubes) directory_.add_cube(place_of(octree::node_key(c.low, c.level)), c.level - 3);
@@ -70,13 +70,13 @@ ORBIS_INLINE void squared_distances::begin(std::span<const voxel_cube> cubes) {
   finish_update();
 }
 
-ORBIS_INLINE void squared_distances::update(std::span<const octant_obstacles> octants) {
+ORBIS_LAZY_INLINE void squared_distances::update(std::span<const octant_obstacles> octants) {
   begin_update();
   set_obstacles(octants);
   finish_update();
 }
 
-ORBIS_INLINE void squared_distances::begin_update() {
+ORBIS_LAZY_INLINE void squared_distances::begin_update() {
   rows_.clear();
   along_.clear();
   stale_plane_.clear();
@@ -85,7 +85,7 @@ ORBIS_INLINE void squared_distances::begin_update() {
   used_kept_ = 0;
 }
 
-ORBIS_INLINE void squared_distances::finish_update() {
+ORBIS_LAZY_INLINE void squared_distances::finish_update() {
   std::sort(rows_.begin(), rows_.end());
   rows_.erase(std::unique(rows_.begin(), rows_.end()), rows_.end());
   update_rows();
@@ -99,7 +99,7 @@ ORBIS_INLINE void squared_distances::finish_update() {
   if (buffer_bytes() > std::max(few, field / 8)) release_buffers();
 }
 
-ORBIS_INLINE std::uint32_t squared_distances::make(const detail::brick_place& p) {
+ORBIS_LAZY_INLINE std::uint32_t squared_distances::make(const detail::brick_place& p) {
   const std::uint32_t found = directory_.find(p);
   if (is_brick(found)) return found;
   const std::uint16_t value = value_without_brick(found);
@@ -122,7 +122,7 @@ ORBIS_INLINE std::uint32_t squared_distances::make(const detail::brick_place& p)
 /// Returns true if removing a brick would not change any value. It is sufficient to compare the distances with the
 /// value that the brick has when it is not stored: if they are all 0, all voxels are obstacles; if they are all far, so
 /// are the other stages, whose values are never less than the distances.
-ORBIS_INLINE bool squared_distances::is_needless(std::uint32_t brick) const {
+ORBIS_LAZY_INLINE bool squared_distances::is_needless(std::uint32_t brick) const {
   const std::uint16_t without = value_without_brick(directory_.without_number(places_[brick]));
   const stages& s = stages_[brick];
   for (const std::uint16_t top : s.space_top)
@@ -131,7 +131,7 @@ ORBIS_INLINE bool squared_distances::is_needless(std::uint32_t brick) const {
   return std::all_of(values.begin(), values.end(), [&](std::uint16_t v) { return v == without; });
 }
 
-ORBIS_INLINE void squared_distances::remove_needless() {
+ORBIS_LAZY_INLINE void squared_distances::remove_needless() {
   needless_.insert(needless_.end(), stale_space_.begin(), stale_space_.end());
   std::erase_if(needless_, [&](std::uint32_t i) { return !is_needless(i); });
   // Remove in descending order, so that the index of the brick that replaces a removed one stays valid.
@@ -141,7 +141,7 @@ ORBIS_INLINE void squared_distances::remove_needless() {
 }
 
 /// Moves the last brick to the index of the removed one.
-ORBIS_INLINE void squared_distances::remove(std::uint32_t brick) {
+ORBIS_LAZY_INLINE void squared_distances::remove(std::uint32_t brick) {
   const auto last = static_cast<std::uint32_t>(stages_.size() - 1);
   directory_.erase(places_[brick]);
   if (brick != last) {
@@ -155,19 +155,19 @@ ORBIS_INLINE void squared_distances::remove(std::uint32_t brick) {
   places_.resize(last);
 }
 
-ORBIS_INLINE std::size_t squared_distances::buffer_bytes() const noexcept {
+ORBIS_LAZY_INLINE std::size_t squared_distances::buffer_bytes() const noexcept {
   return kept_.memory_bytes() + rows_.capacity() * sizeof(std::uint64_t) + along_.capacity() * sizeof(along_change) +
          (stale_plane_.capacity() + stale_space_.capacity() + needless_.capacity() + line_.capacity()) *
              sizeof(std::uint32_t) +
          line_bits_.capacity() + left_.capacity() + right_.capacity();
 }
 
-ORBIS_INLINE void squared_distances::release_buffers() {
+ORBIS_LAZY_INLINE void squared_distances::release_buffers() {
   const auto release = [](auto&... buffers) { ((buffers = std::remove_cvref_t<decltype(buffers)>()), ...); };
   release(rows_, along_, kept_, stale_plane_, stale_space_, needless_, line_, line_bits_, left_, right_);
 }
 
-ORBIS_INLINE int squared_distances::offer_reach(std::uint16_t least) const noexcept {
+ORBIS_LAZY_INLINE int squared_distances::offer_reach(std::uint16_t least) const noexcept {
   const int left = bound() - least;
   if (left < 0) return -1;
   int r = static_cast<int>(std::sqrt(static_cast<float>(left)));
@@ -179,7 +179,7 @@ ORBIS_INLINE int squared_distances::offer_reach(std::uint16_t least) const noexc
 // -- the obstacles
 
 /// Copies the masks, and lists the rows of eight voxels that changed.
-ORBIS_INLINE void squared_distances::set_obstacles(std::span<const octant_obstacles> octants) {
+ORBIS_LAZY_INLINE void squared_distances::set_obstacles(std::span<const octant_obstacles> octants) {
   detail::brick_place last{-1, -1, -1};
   std::uint32_t number = none;
   for (const octant_obstacles& o : octants) {
@@ -211,7 +211,7 @@ ORBIS_INLINE void squared_distances::set_obstacles(std::span<const octant_obstac
 }
 
 /// `row`: z * 8 + y in the brick.
-ORBIS_INLINE void squared_distances::list_row(const detail::brick_place& p, std::size_t row) {
+ORBIS_LAZY_INLINE void squared_distances::list_row(const detail::brick_place& p, std::size_t row) {
   // Voxel coordinates have at most 21 bits, brick coordinates 18.
   rows_.push_back(static_cast<std::uint64_t>(p.z * 8 + static_cast<int>(row >> 3U)) << 39U |
                   static_cast<std::uint64_t>(p.y * 8 + static_cast<int>(row & 7U)) << 18U |
@@ -220,7 +220,7 @@ ORBIS_INLINE void squared_distances::list_row(const detail::brick_place& p, std:
 
 // -- along x
 
-ORBIS_INLINE void squared_distances::update_rows() {
+ORBIS_LAZY_INLINE void squared_distances::update_rows() {
   const std::span<const std::uint64_t> rows{rows_};
   for (std::size_t first = 0; first != rows.size();) {
     // Rows of a line whose distances may depend on each other are computed together.
@@ -233,7 +233,7 @@ ORBIS_INLINE void squared_distances::update_rows() {
   }
 }
 
-ORBIS_INLINE void squared_distances::update_line(std::span<const std::uint64_t> rows) {
+ORBIS_LAZY_INLINE void squared_distances::update_line(std::span<const std::uint64_t> rows) {
   const auto brick_x = [](std::uint64_t row) { return static_cast<int>(row & 0x3ffffU); };
   const auto y = static_cast<int>(rows.front() >> 18U & 0x1fffffU), z = static_cast<int>(rows.front() >> 39U);
   const int first = brick_x(rows.front()) - bricks_in_reach_, last = brick_x(rows.back()) + bricks_in_reach_;
@@ -306,7 +306,7 @@ inline void offer_row(std::uint64_t from, std::uint64_t other, slice_offer& out)
 
 }  // namespace detail
 
-ORBIS_INLINE void squared_distances::keep_plane(std::uint32_t brick, unsigned changed) {
+ORBIS_LAZY_INLINE void squared_distances::keep_plane(std::uint32_t brick, unsigned changed) {
   stages& s = stages_[brick];
   if (s.kept == none) {
     if (used_kept_ == kept_.size()) kept_.emplace_back();
@@ -322,7 +322,7 @@ ORBIS_INLINE void squared_distances::keep_plane(std::uint32_t brick, unsigned ch
   kept.changed |= static_cast<std::uint8_t>(changed);
 }
 
-ORBIS_INLINE void squared_distances::spread_along_y() {
+ORBIS_LAZY_INLINE void squared_distances::spread_along_y() {
   detail::slice_offer offer;
   // Calls visit(position of a target brick, z in the brick, squares, the smallest square) for the slices within reach
   // of the row.
@@ -378,7 +378,7 @@ ORBIS_INLINE void squared_distances::spread_along_y() {
 }
 
 /// Computes a slice of `plane` from the rows within reach.
-ORBIS_INLINE void squared_distances::make_plane(std::uint32_t brick, int z) {
+ORBIS_LAZY_INLINE void squared_distances::make_plane(std::uint32_t brick, int z) {
   const detail::brick_place p = places_[brick];
   alignas(64) detail::slice best;
   best.fill(detail::far_away);
@@ -405,7 +405,7 @@ ORBIS_INLINE void squared_distances::make_plane(std::uint32_t brick, int z) {
 
 // -- along z
 
-ORBIS_INLINE void squared_distances::spread_along_z() {
+ORBIS_LAZY_INLINE void squared_distances::spread_along_z() {
   detail::slice_offer offer;
   // Calls visit(position of a target brick, source position relative to its slices, first and last slice within reach).
   const auto for_each_target = [&](const detail::brick_place& p, int z, auto&& visit) {
@@ -466,7 +466,7 @@ ORBIS_INLINE void squared_distances::spread_along_z() {
 }
 
 /// Computes slices of the result from the planes within reach.
-ORBIS_INLINE void squared_distances::make_space(std::uint32_t brick, unsigned slices) {
+ORBIS_LAZY_INLINE void squared_distances::make_space(std::uint32_t brick, unsigned slices) {
   static constexpr detail::slice obstacles{};
   const detail::brick_place p = places_[brick];
   // The planes above and below the brick, from the nearest to the farthest.
@@ -498,7 +498,7 @@ ORBIS_INLINE void squared_distances::make_space(std::uint32_t brick, unsigned sl
 
 // -- queries
 
-ORBIS_INLINE std::optional<octree::voxel_key> squared_distances::nearest(const octree::voxel_key& k) const {
+ORBIS_LAZY_INLINE std::optional<octree::voxel_key> squared_distances::nearest(const octree::voxel_key& k) const {
   const int target = squared(k);
   if (target == far) return std::nullopt;
   const auto x = static_cast<int>(k.x), y = static_cast<int>(k.y), z = static_cast<int>(k.z);
@@ -529,7 +529,7 @@ ORBIS_INLINE std::optional<octree::voxel_key> squared_distances::nearest(const o
   return std::nullopt;
 }
 
-ORBIS_INLINE std::size_t squared_distances::memory_bytes() const noexcept {
+ORBIS_LAZY_INLINE std::size_t squared_distances::memory_bytes() const noexcept {
   return directory_.memory_bytes() + values_.memory_bytes() + places_.memory_bytes() + stages_.memory_bytes() +
          squares_.capacity() * sizeof(std::uint16_t) + buffer_bytes();
 }

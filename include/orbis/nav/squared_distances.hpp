@@ -29,6 +29,7 @@
 #include <vector>
 
 #include <orbis/core/cow_pages.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/nav/detail/field/block_vector.hpp>
 #include <orbis/nav/detail/field/brick_directory.hpp>
 #include <orbis/nav/detail/field/slice_code.hpp>
@@ -146,14 +147,14 @@ class squared_distances : public squared_distance_view {
   /// `reach`: maximum distance, in voxels. `cells`: number of grid cells along an axis. `elsewhere_is_obstacle`: true
   /// if voxels that were never set, and all space outside the grid, are obstacles. @pre 1 <= reach <= 181; cells is a
   /// multiple of 8
-  squared_distances(int reach, std::uint32_t cells, bool elsewhere_is_obstacle);
+  ORBIS_LAZY squared_distances(int reach, std::uint32_t cells, bool elsewhere_is_obstacle);
 
   /// Initialises these cubes to the opposite state of the rest of space (`elsewhere_is_obstacle`). Bricks are stored
   /// only within reach of the cubes' faces, on the free side: outside full cubes, inside free ones (see
   /// max_added_bricks). @pre `update` has not been called; the cubes are disjoint, in the grid, and of level 6 or more
-  void begin(std::span<const voxel_cube> cubes);
+  ORBIS_LAZY void begin(std::span<const voxel_cube> cubes);
   /// Maximum number of bricks that a single cube adds to the field. O(1).
-  [[nodiscard]] std::uint64_t max_added_bricks(const voxel_cube& cube) const noexcept;
+  ORBIS_LAZY [[nodiscard]] std::uint64_t max_added_bricks(const voxel_cube& cube) const noexcept;
   /// Returns true if a node (level 2 or more) is in one of the cubes that the field was initialised with. O(levels).
   [[nodiscard]] bool is_in_cube(const voxel_cube& node) const noexcept {
     return directory_.has_cubes() && directory_.is_in_cube(place_of(node.low), std::max(node.level - 3, 0));
@@ -168,13 +169,13 @@ class squared_distances : public squared_distance_view {
   /// nearer, and voxels affected by several neighbours are computed once. Memory that a large update needs in addition
   /// to the field (up to its size) is released at its end; small updates allocate nothing except new bricks.
   /// @pre keys lie in the grid
-  void update(std::span<const octant_obstacles> octants);
+  ORBIS_LAZY void update(std::span<const octant_obstacles> octants);
 
   /// Returns true if voxel `k` is an obstacle. O(1).
   [[nodiscard]] bool is_obstacle(const octree::voxel_key& k) const noexcept { return squared(k) == 0; }
   /// The obstacle nearest to voxel `k` (one of them on ties); empty if there is none within reach. It may be a voxel
   /// that was never set (see `elsewhere_is_obstacle`). O(reach).
-  [[nodiscard]] std::optional<octree::voxel_key> nearest(const octree::voxel_key& k) const;
+  ORBIS_LAZY [[nodiscard]] std::optional<octree::voxel_key> nearest(const octree::voxel_key& k) const;
 
   /// A view for readers. It is part of the field: read or copy it on the thread that updates the field, between two
   /// updates. A copy does not change; it may be passed to other threads, read by several threads concurrently, and
@@ -183,7 +184,7 @@ class squared_distances : public squared_distance_view {
   /// On the updating thread, no copy is needed.
   [[nodiscard]] const squared_distance_view& view() const noexcept { return *this; }
   /// Heap memory in bytes, including memory shared with copies of the view.
-  [[nodiscard]] std::size_t memory_bytes() const noexcept;
+  ORBIS_LAZY [[nodiscard]] std::size_t memory_bytes() const noexcept;
 
  private:
   static constexpr std::uint32_t none = detail::brick_directory::none;
@@ -213,12 +214,12 @@ class squared_distances : public squared_distance_view {
     std::uint64_t before, after;  ///< eight distances
   };
 
-  [[nodiscard]] std::uint32_t make(const detail::brick_place& p);
-  [[nodiscard]] bool is_needless(std::uint32_t brick) const;
-  void remove_needless();
-  void remove(std::uint32_t brick);
-  [[nodiscard]] std::size_t buffer_bytes() const noexcept;
-  void release_buffers();
+  ORBIS_LAZY [[nodiscard]] std::uint32_t make(const detail::brick_place& p);
+  ORBIS_LAZY [[nodiscard]] bool is_needless(std::uint32_t brick) const;
+  ORBIS_LAZY void remove_needless();
+  ORBIS_LAZY void remove(std::uint32_t brick);
+  ORBIS_LAZY [[nodiscard]] std::size_t buffer_bytes() const noexcept;
+  ORBIS_LAZY void release_buffers();
   /// For a brick that is not stored: `is_full` returns true if it is full of obstacles; `row_bits` returns one of its
   /// rows.
   [[nodiscard]] bool is_full(std::uint32_t found) const noexcept { return value_without_brick(found) == 0; }
@@ -230,21 +231,21 @@ class squared_distances : public squared_distance_view {
     return squares_.data() + 8 * (distance + squares_pad_);
   }
   /// Maximum distance, in voxels, at which `least` plus the squared distance is within `bound()`; negative if none.
-  [[nodiscard]] int offer_reach(std::uint16_t least) const noexcept;
+  ORBIS_LAZY [[nodiscard]] int offer_reach(std::uint16_t least) const noexcept;
 
   /// `begin_update` clears the change lists of the previous update; `finish_update` propagates the new changes through
   /// all stages.
-  void begin_update();
-  void finish_update();
-  void set_obstacles(std::span<const octant_obstacles> octants);
-  void list_row(const detail::brick_place& p, std::size_t row);
-  void update_rows();
-  void update_line(std::span<const std::uint64_t> rows);
-  void spread_along_y();
-  void spread_along_z();
-  void keep_plane(std::uint32_t brick, unsigned changed);
-  void make_plane(std::uint32_t brick, int z);
-  void make_space(std::uint32_t brick, unsigned slices);
+  ORBIS_LAZY void begin_update();
+  ORBIS_LAZY void finish_update();
+  ORBIS_LAZY void set_obstacles(std::span<const octant_obstacles> octants);
+  ORBIS_LAZY void list_row(const detail::brick_place& p, std::size_t row);
+  ORBIS_LAZY void update_rows();
+  ORBIS_LAZY void update_line(std::span<const std::uint64_t> rows);
+  ORBIS_LAZY void spread_along_y();
+  ORBIS_LAZY void spread_along_z();
+  ORBIS_LAZY void keep_plane(std::uint32_t brick, unsigned changed);
+  ORBIS_LAZY void make_plane(std::uint32_t brick, int z);
+  ORBIS_LAZY void make_space(std::uint32_t brick, unsigned slices);
 
   detail::slice_code kernels_;
   detail::block_vector<stages> stages_;  ///< indexed by brick

@@ -22,14 +22,15 @@ struct brick_place {
 };
 
 /// Brick indices by position, stored in blocks of 8x8x8 bricks. Copies share the blocks until one of them changes.
-class brick_directory {
+template <class = void>
+class basic_brick_directory {
  public:
   /// Results of `find` for positions without an index: `inner` in one of the cubes (see add_cube), `none` outside all
   /// of them.
   static constexpr std::uint32_t none = hash_index::none, inner = none - 1;
 
   /// `bricks`: edge of the grid in bricks. Positions outside the grid are never found.
-  explicit brick_directory(std::uint32_t bricks) noexcept : bricks_{bricks} {}
+  explicit basic_brick_directory(std::uint32_t bricks) noexcept : bricks_{bricks} {}
 
   [[nodiscard]] bool is_inside(const brick_place& p) const noexcept {
     return static_cast<std::uint32_t>(p.x) < bricks_ && static_cast<std::uint32_t>(p.y) < bricks_ &&
@@ -96,7 +97,7 @@ class brick_directory {
   /// Looks up bricks, each near the previous one. Valid until the directory changes.
   class cursor {
    public:
-    explicit cursor(const brick_directory& directory) noexcept : directory_{&directory} {}
+    explicit cursor(const basic_brick_directory& directory) noexcept : directory_{&directory} {}
     [[nodiscard]] std::uint32_t find(const brick_place& p) noexcept {
       if (!directory_->is_inside(p)) return none;
       if (const std::uint64_t n = name(p); n != name_) {
@@ -108,7 +109,7 @@ class brick_directory {
     }
 
    private:
-    const brick_directory* directory_;
+    const basic_brick_directory* directory_;
     std::uint64_t name_ = ~std::uint64_t{0};
     const std::array<std::uint32_t, 512>* block_ = nullptr;
   };
@@ -135,5 +136,6 @@ class brick_directory {
   cow_pages<block> numbers_;
   std::vector<std::uint64_t> names_;  ///< names of the blocks
 };
+using brick_directory = basic_brick_directory<>;
 
 }  // namespace orbis::nav::detail

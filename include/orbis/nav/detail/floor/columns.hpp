@@ -24,10 +24,11 @@ inline constexpr std::array<std::uint64_t, 4> octant_layers{0x000000000f0f0f0f, 
                                                             0xf0f0f0f000000000};
 
 /// The voxels in a box of a map, column by column: one bit each for "known" and for "occupied".
-class voxel_columns {
+template <class = void>
+class basic_voxel_columns {
  public:
   /// Creates columns of unknown voxels. @pre low and size are multiples of 4
-  voxel_columns(const octree::voxel_key& low, std::array<std::uint32_t, 3> size)
+  basic_voxel_columns(const octree::voxel_key& low, std::array<std::uint32_t, 3> size)
       : low_{low},
         size_{size},
         words_{(size[2] + 63) / 64},
@@ -133,6 +134,7 @@ class voxel_columns {
   std::size_t words_;
   std::vector<std::uint64_t> known_, occupied_;  ///< words_ words per column, row by row
 };
+using voxel_columns = basic_voxel_columns<>;
 
 /// The columns of a box of voxels, cropped along all axes to the octants with known voxels. Errors: no_data,
 /// invalid_argument (more than `most` words of 64 levels). O(octants and larger leaves in the box + words).
