@@ -114,7 +114,7 @@ namespace detail {
 
 inline constexpr const char* absolute_orientation_name = "absolute orientation";
 
-ORBIS_INLINE result<void> check_pairs(std::size_t from, std::size_t to, std::span<const double> weights) {
+ORBIS_LAZY_INLINE result<void> check_pairs(std::size_t from, std::size_t to, std::span<const double> weights) {
   constexpr const char* where = absolute_orientation_name;
   if (from != to) return fail(errc::invalid_argument, where, "the two lists of points differ in length");
   if (!weights.empty() && weights.size() != from)
@@ -127,11 +127,11 @@ ORBIS_INLINE result<void> check_pairs(std::size_t from, std::size_t to, std::spa
   return {};
 }
 
-ORBIS_INLINE std::optional<sim3> align_by_moments(const pair_moments& moments, std::size_t n, bool with_scale) {
+ORBIS_LAZY_INLINE std::optional<sim3> align_by_moments(const pair_moments& moments, std::size_t n, bool with_scale) {
   return transform_between(moments, n, with_scale);
 }
 
-ORBIS_INLINE error alignment_error(std::size_t not_finite, std::size_t n) {
+ORBIS_LAZY_INLINE error alignment_error(std::size_t not_finite, std::size_t n) {
   if (not_finite != n)
     return {errc::degenerate, absolute_orientation_name,
             "a coordinate of pair " + std::to_string(not_finite) + " is not finite"};

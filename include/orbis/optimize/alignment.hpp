@@ -16,6 +16,7 @@
 #include <span>
 #include <vector>
 
+#include <orbis/core/inline.hpp>
 #include <orbis/core/point.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
@@ -46,11 +47,12 @@ template <point_range Points>
 }
 
 /// Returns an error if lists of these lengths cannot be aligned.
-[[nodiscard]] result<void> check_pairs(std::size_t from, std::size_t to, std::span<const double> weights);
+ORBIS_LAZY [[nodiscard]] result<void> check_pairs(std::size_t from, std::size_t to, std::span<const double> weights);
 /// Returns the transform determined by the moments of n pairs; empty if they do not determine a rotation.
-[[nodiscard]] std::optional<sim3> align_by_moments(const pair_moments& moments, std::size_t n, bool with_scale);
+ORBIS_LAZY [[nodiscard]] std::optional<sim3> align_by_moments(const pair_moments& moments, std::size_t n,
+                                                              bool with_scale);
 /// The error for a failed alignment; `not_finite`: index of the first pair that is not finite, or n.
-[[nodiscard]] error alignment_error(std::size_t not_finite, std::size_t n);
+ORBIS_LAZY [[nodiscard]] error alignment_error(std::size_t not_finite, std::size_t n);
 
 /// Returns the transform between two lists of points. Without weights, all pairs have equal weight.
 template <point_range From, point_range To>

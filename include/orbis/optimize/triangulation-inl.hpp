@@ -15,7 +15,7 @@ namespace orbis::optimize {
 
 namespace detail {
 
-ORBIS_INLINE mat3 essential_matrix(const se3& T_second_first) {
+ORBIS_LAZY_INLINE mat3 essential_matrix(const se3& T_second_first) {
   return hat<double>(T_second_first.translation()) * T_second_first.rotation_matrix();
 }
 

@@ -14,6 +14,7 @@
 #include <span>
 #include <string_view>
 
+#include <orbis/core/inline.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
 
@@ -59,7 +60,7 @@ namespace detail {
 }
 
 /// Returns the matrix E with `second^T E first = 0` for two rays to the same point: [t]x R of `T_second_first`.
-[[nodiscard]] mat3 essential_matrix(const se3& T_second_first);
+ORBIS_LAZY [[nodiscard]] mat3 essential_matrix(const se3& T_second_first);
 
 /// Implements `triangulate` for any number of rays.
 template <class S>

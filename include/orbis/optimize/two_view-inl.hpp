@@ -163,7 +163,7 @@ result<homography_estimate> estimate_homography(std::span<const vec2> first, std
   return out;
 }
 
-ORBIS_INLINE result<std::vector<plane_motion>> decompose_homography(const mat3& homography, const vec3& ray) {
+ORBIS_LAZY_INLINE result<std::vector<plane_motion>> decompose_homography(const mat3& homography, const vec3& ray) {
   constexpr const char* where = "homography";
   mat3 h = homography;
   if (!all_finite(h)) return fail(errc::degenerate, where, "is not finite");

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include <orbis/camera/model.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/core/se3.hpp>
 #include <orbis/core/types.hpp>
@@ -118,8 +119,8 @@ template <std::same_as<homography_options> Options = homography_options>
 /// Returns the motions that a homography between rays at z = 1 may represent, regardless of its scale and sign: two, or
 /// one if there is no translation. (Two further solutions have the plane behind the first camera.) `ray` is any matched
 /// ray of the first camera, with z > 0. Errors: `degenerate` if the homography is singular or not finite.
-[[nodiscard]] result<std::vector<plane_motion>> decompose_homography(const mat3& homography,
-                                                                     const vec3& ray = vec3(0.0, 0.0, 1.0));
+ORBIS_LAZY [[nodiscard]] result<std::vector<plane_motion>> decompose_homography(const mat3& homography,
+                                                                                const vec3& ray = vec3(0.0, 0.0, 1.0));
 
 struct two_view_options {
   double deviation = 1.0;            ///< standard deviation of a matched pixel, along each axis, pixels

@@ -22,13 +22,16 @@ namespace detail {
 inline constexpr std::string_view map_magic = "orbismap";
 inline constexpr std::uint32_t map_version = 4;
 
+template <class = void>
 inline void put_pose(std::string& to, const se3& pose) {
   const auto& q = pose.rotation().unit_quaternion();
   put(to, pose.translation().x(), pose.translation().y(), pose.translation().z(), q.x(), q.y(), q.z(), q.w());
 }
+template <class = void>
 inline void put_descriptor(std::string& to, const features::binary_descriptor<256>& d) {
   for (const std::uint64_t w : d.words) put(to, w);
 }
+template <class = void>
 inline void put_keyframe(std::string& to, const keyframe& k) {
   put(to, k.timestamp, std::uint64_t{k.index});
   put_pose(to, k.T_world_camera);
@@ -40,6 +43,7 @@ inline void put_keyframe(std::string& to, const keyframe& k) {
   }
 }
 
+template <class = void>
 inline void put_landmark(std::string& to, const landmark& l) {
   put(to, static_cast<std::uint32_t>(l.observations.size()));
   for (const vec3& v : {l.position, l.normal}) put(to, v.x(), v.y(), v.z());
@@ -50,7 +54,8 @@ inline void put_landmark(std::string& to, const landmark& l) {
 }
 
 /// Returns the bytes of the whole file.
-[[nodiscard]] inline std::string write_sections(const map& m) {
+template <class = void>
+[[nodiscard]] std::string write_sections(const map& m) {
   std::string bytes(map_magic);
   put(bytes, map_version);
   const bool leaves_out_erased = m.landmark_end() > most_landmarks_of_file;
@@ -110,9 +115,9 @@ inline void put_landmark(std::string& to, const landmark& l) {
 
 }  // namespace detail
 
-ORBIS_INLINE std::string map_bytes(const map& m) { return detail::write_sections(m); }
+ORBIS_LAZY_INLINE std::string map_bytes(const map& m) { return detail::write_sections(m); }
 
-ORBIS_INLINE result<map> parse_map(std::span<const std::byte> bytes, const std::string& where) {
+ORBIS_LAZY_INLINE result<map> parse_map(std::span<const std::byte> bytes, const std::string& where) {
   const std::string_view text{reinterpret_cast<const char*>(bytes.data()), bytes.size()};
   constexpr std::size_t head = detail::map_magic.size() + sizeof(detail::map_version);
   if (text.substr(0, detail::map_magic.size()) != detail::map_magic)
@@ -123,13 +128,13 @@ ORBIS_INLINE result<map> parse_map(std::span<const std::byte> bytes, const std::
     return fail(errc::unsupported, where,
                 "version " + std::to_string(version) + "; only versions 1 to 4 are supported");
 
-  detail::map_reader::content parts;
-  detail::map_reader read{parts, version};
+  using reader = detail::map_reader<>;
+  reader::content parts;
+  reader read{parts, version};
   detail::section_finder next{text, head};
-  using section = std::pair<std::string_view, bool (detail::map_reader::*)(detail::section_reader)>;
-  for (const auto& [name, take] :
-       {section{"size", &detail::map_reader::sizes}, section{"kfrm", &detail::map_reader::keyframes},
-        section{"tree", &detail::map_reader::tree}, section{"land", &detail::map_reader::landmarks}}) {
+  using section = std::pair<std::string_view, bool (reader::*)(detail::section_reader)>;
+  for (const auto& [name, take] : {section{"size", &reader::sizes}, section{"kfrm", &reader::keyframes},
+                                   section{"tree", &reader::tree}, section{"land", &reader::landmarks}}) {
     const auto content = next.find(name);
     if (!content) return fail(errc::malformed, where, next.problem());
     if (!(read.*take)(*content)) return fail(errc::malformed, where, std::move(read.problem));
@@ -138,18 +143,18 @@ ORBIS_INLINE result<map> parse_map(std::span<const std::byte> bytes, const std::
   return map{std::move(parts)};
 }
 
-ORBIS_INLINE result<map> read_map(const std::filesystem::path& path) {
+ORBIS_LAZY_INLINE result<map> read_map(const std::filesystem::path& path) {
   const auto bytes = read_file(path);
   if (!bytes) return fail(bytes.error());
   return parse_map(std::as_bytes(std::span{*bytes}), path.string());
 }
 
-ORBIS_INLINE result<void> write_map_bytes(const std::filesystem::path& path, const std::string& bytes) {
+ORBIS_LAZY_INLINE result<void> write_map_bytes(const std::filesystem::path& path, const std::string& bytes) {
   return write_file_atomically(
       path, [&](std::ostream& out) { out.write(bytes.data(), static_cast<std::streamsize>(bytes.size())); });
 }
 
-ORBIS_INLINE result<void> write_map(const std::filesystem::path& path, const map& m) {
+ORBIS_LAZY_INLINE result<void> write_map(const std::filesystem::path& path, const map& m) {
   return write_map_bytes(path, map_bytes(m));
 }
 

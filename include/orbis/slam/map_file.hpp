@@ -37,27 +37,28 @@
 #include <span>
 #include <string>
 
+#include <orbis/core/inline.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/slam/map.hpp>
 
 namespace orbis::slam {
 
 /// Returns the content of a map file as bytes. O(map).
-[[nodiscard]] std::string map_bytes(const map& m);
+ORBIS_LAZY [[nodiscard]] std::string map_bytes(const map& m);
 
 /// Parses the map in `bytes`; `where` names the source in errors. The returned map is consistent for any input. Errors:
 /// `malformed` (with the section and the problem), `unsupported` (another version).
-[[nodiscard]] result<map> parse_map(std::span<const std::byte> bytes, const std::string& where = "bytes");
+ORBIS_LAZY [[nodiscard]] result<map> parse_map(std::span<const std::byte> bytes, const std::string& where = "bytes");
 
 /// Reads a map from a file. Errors: `not_found`, `unreadable`, and those of `parse_map`.
-[[nodiscard]] result<map> read_map(const std::filesystem::path& path);
+ORBIS_LAZY [[nodiscard]] result<map> read_map(const std::filesystem::path& path);
 
 /// Writes the result of `map_bytes` to a file; an existing file is replaced only after everything is written. Errors:
 /// `write_failed`.
-[[nodiscard]] result<void> write_map_bytes(const std::filesystem::path& path, const std::string& bytes);
+ORBIS_LAZY [[nodiscard]] result<void> write_map_bytes(const std::filesystem::path& path, const std::string& bytes);
 
 /// Writes a map to a file, like `write_map_bytes`. Errors: `write_failed`.
-[[nodiscard]] result<void> write_map(const std::filesystem::path& path, const map& m);
+ORBIS_LAZY [[nodiscard]] result<void> write_map(const std::filesystem::path& path, const map& m);
 
 }  // namespace orbis::slam
 

@@ -127,6 +127,7 @@ class bundle_structure {
         by_point_[cursor_[at->other]++] = {at->observation, c};
   }
 
+  template <class = void>
   void number_cameras(std::size_t cameras, std::span<const std::uint8_t> fixed) {
     unknown.assign(cameras, none);
     camera.clear();
@@ -138,6 +139,7 @@ class bundle_structure {
   }
 
   /// Sorts points by their first and last movable cameras and by the number of their movable cameras.
+  template <class = void>
   void order_points(std::size_t points) {
     const auto n = static_cast<std::uint32_t>(unknowns());
     spans_.assign(points, {});
@@ -168,6 +170,7 @@ class bundle_structure {
     point_source.swap(moved_);
   }
 
+  template <class = void>
   void find_points_alike() {
     is_like_last_.assign(points(), 0);
     for (std::size_t p = 1; p < points(); ++p) {
@@ -184,6 +187,7 @@ class bundle_structure {
   }
 
   /// Divides the points into chunks. A chunk ends when it has enough observations, in total and per camera.
+  template <class = void>
   void lay_out(std::size_t cameras) {
     constexpr std::size_t enough = 2048, enough_of_camera = 48;
     segments.clear();
@@ -240,6 +244,7 @@ class bundle_structure {
     while (next != end && next - p < most && is_like_last_[next] != 0) ++next;
     return next;
   }
+  template <class = void>
   void place_group(std::size_t begin, std::size_t end) {
     group g;
     g.first_point = static_cast<std::uint32_t>(begin);
@@ -281,6 +286,7 @@ class bundle_structure {
     }
   }
 
+  template <class = void>
   void find_blocks() {
     const std::size_t n = unknowns();
     present_.assign((n * (n + 1) / 2 + 63) / 64, 0);

@@ -41,13 +41,14 @@ namespace orbis::optimize::detail {
   return {se3(one, t), se3(one, -t), se3(other, t), se3(other, -t)};
 }
 
-class essential_estimator {
+template <class = void>
+class basic_essential_estimator {
  public:
   using model = mat3;
   static constexpr std::size_t sample_size = 5;
   static constexpr double model_cost = 2000.0;  ///< see `ransac_options`
 
-  explicit essential_estimator(const std::vector<image_match>& matches) : matches_{matches} {
+  explicit basic_essential_estimator(const std::vector<image_match>& matches) : matches_{matches} {
     stride_ = (matches.size() + consensus_block - 1) / consensus_block * consensus_block;
     columns_.assign(10 * stride_, 0.0F);
     for (std::size_t i = 0; i != matches.size(); ++i) {
@@ -130,6 +131,7 @@ class essential_estimator {
   std::vector<float> columns_;
   std::size_t stride_ = 0;
 };
+using essential_estimator = basic_essential_estimator<>;
 
 /// Returns the number of inliers that a pure rotation of the camera explains. The rotation is estimated with weights
 /// that decrease with the error, because the inliers include wrong matches that are close to their epipolar lines by

@@ -103,14 +103,15 @@ struct homography_equations {
 
 /// Estimates a homography from matches of rays. For matches of pixels, the rays are centred and scaled pixels, with the
 /// identity as their metric.
-class homography_estimator {
+template <class = void>
+class basic_homography_estimator {
  public:
   struct model {
     mat3 forward, backward;  ///< both matrices give positive z for rays that are transferred to the front of the camera
   };
   static constexpr std::size_t sample_size = 4;
 
-  explicit homography_estimator(const std::vector<image_match>& matches) : matches_{matches} {
+  explicit basic_homography_estimator(const std::vector<image_match>& matches) : matches_{matches} {
     const std::size_t size = (matches.size() + consensus_block - 1) / consensus_block * consensus_block;
     for (auto& column : columns_) column.resize(size);
     for (std::size_t i = 0; i != matches.size(); ++i) {
@@ -220,5 +221,6 @@ class homography_estimator {
   const std::vector<image_match>& matches_;
   std::array<column, 10> columns_;  // x, y, xx, xy and yy of the first and of the second rays
 };
+using homography_estimator = basic_homography_estimator<>;
 
 }  // namespace orbis::optimize::detail

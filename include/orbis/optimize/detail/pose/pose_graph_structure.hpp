@@ -79,7 +79,8 @@ struct edge_bundle {
 };
 
 /// The unknowns and blocks of a graph. Reused as long as the edges connect the same vertices.
-class pose_graph_structure {
+template <class = void>
+class basic_pose_graph_structure {
  public:
   static constexpr std::uint32_t held = std::numeric_limits<std::uint32_t>::max();
 
@@ -198,5 +199,6 @@ class pose_graph_structure {
   std::vector<std::uint32_t> root_;
   std::vector<std::uint8_t> touched_, anchored_;
 };
+using pose_graph_structure = basic_pose_graph_structure<>;
 
 }  // namespace orbis::optimize::detail

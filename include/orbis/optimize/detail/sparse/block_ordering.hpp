@@ -55,6 +55,7 @@ class block_adjacency {
 /// The quotient graph during an elimination. A node is a variable (not yet eliminated; it may represent several with
 /// the same neighbours), an element (eliminated; its list is the resulting clique), or `gone` (absorbed by another
 /// node).
+template <class = void>
 class quotient_graph {
  public:
   explicit quotient_graph(const block_adjacency& graph)
@@ -289,8 +290,9 @@ class quotient_graph {
 
 /// Returns an approximate minimum degree elimination order: `order[k]` is the k-th block to eliminate. Deterministic;
 /// about O(places) for meshes and pose graphs.
-[[nodiscard]] inline std::vector<std::uint32_t> minimum_degree_order(const block_adjacency& graph) {
-  return quotient_graph{graph}.eliminate_all();
+template <class = void>
+[[nodiscard]] std::vector<std::uint32_t> minimum_degree_order(const block_adjacency& graph) {
+  return quotient_graph<>{graph}.eliminate_all();
 }
 
 }  // namespace orbis::optimize::detail

@@ -58,9 +58,10 @@ struct block_symbolic {
 inline constexpr std::uint32_t no_block = std::numeric_limits<std::uint32_t>::max();
 
 /// Returns the parent of each column: its first nonzero row below the diagonal.
-[[nodiscard]] inline std::vector<std::uint32_t> elimination_tree(const block_adjacency& graph,
-                                                                 const std::vector<std::uint32_t>& order,
-                                                                 const std::vector<std::uint32_t>& position) {
+template <class = void>
+[[nodiscard]] std::vector<std::uint32_t> elimination_tree(const block_adjacency& graph,
+                                                          const std::vector<std::uint32_t>& order,
+                                                          const std::vector<std::uint32_t>& position) {
   std::vector<std::uint32_t> parent(order.size(), no_block), ancestor(order.size(), no_block);
   for (std::uint32_t k = 0; k != order.size(); ++k)
     for (const std::uint32_t neighbor : graph.neighbors(order[k])) {
@@ -77,7 +78,8 @@ inline constexpr std::uint32_t no_block = std::numeric_limits<std::uint32_t>::ma
 }
 
 /// Returns a postorder of the columns: every subtree is consecutive, and children precede their parent.
-[[nodiscard]] inline std::vector<std::uint32_t> postorder(const std::vector<std::uint32_t>& parent) {
+template <class = void>
+[[nodiscard]] std::vector<std::uint32_t> postorder(const std::vector<std::uint32_t>& parent) {
   const std::size_t n = parent.size();
   std::vector<std::uint32_t> child(n, no_block), sibling(n, no_block), stack, result;
   result.reserve(n);
@@ -104,9 +106,9 @@ inline constexpr std::uint32_t no_block = std::numeric_limits<std::uint32_t>::ma
 }
 
 /// Returns the number of blocks in each column of the factor, including the diagonal.
-[[nodiscard]] inline std::vector<std::uint32_t> column_counts(const block_adjacency& graph,
-                                                              const block_symbolic& symbolic,
-                                                              const std::vector<std::uint32_t>& parent) {
+template <class = void>
+[[nodiscard]] std::vector<std::uint32_t> column_counts(const block_adjacency& graph, const block_symbolic& symbolic,
+                                                       const std::vector<std::uint32_t>& parent) {
   std::vector<std::uint32_t> count(parent.size(), 1), seen(parent.size(), no_block);
   for (std::uint32_t k = 0; k != parent.size(); ++k) {
     seen[k] = k;
@@ -126,8 +128,9 @@ inline constexpr std::uint32_t no_block = std::numeric_limits<std::uint32_t>::ma
 }
 
 /// Groups columns; sets all members of the supernodes except their rows.
-inline void group_columns(block_symbolic& symbolic, const std::vector<std::uint32_t>& parent,
-                          const std::vector<std::uint32_t>& count) {
+template <class = void>
+void group_columns(block_symbolic& symbolic, const std::vector<std::uint32_t>& parent,
+                   const std::vector<std::uint32_t>& count) {
   struct group {
     std::uint32_t first, last;
     std::size_t rows;  ///< number of rows below the last column
@@ -162,7 +165,8 @@ inline void group_columns(block_symbolic& symbolic, const std::vector<std::uint3
 }
 
 /// Computes the rows of every supernode: those of its columns and of its children.
-inline void find_rows(block_symbolic& symbolic, const block_adjacency& graph) {
+template <class = void>
+void find_rows(block_symbolic& symbolic, const block_adjacency& graph) {
   std::vector<std::uint32_t> seen(symbolic.size(), no_block), child(symbolic.supernodes.size(), no_block),
       sibling(symbolic.supernodes.size(), no_block);
   for (std::uint32_t s = 0; s != symbolic.supernodes.size(); ++s) {
@@ -193,7 +197,8 @@ inline void find_rows(block_symbolic& symbolic, const block_adjacency& graph) {
 }
 
 /// Computes the updates between supernodes.
-inline void find_updates(block_symbolic& symbolic) {
+template <class = void>
+void find_updates(block_symbolic& symbolic) {
   const auto for_each = [&](auto&& visit) {
     for (std::uint32_t s = 0; s != symbolic.supernodes.size(); ++s) {
       const std::span<const std::uint32_t> rows = symbolic.rows_of(symbolic.supernodes[s]);
@@ -215,7 +220,8 @@ inline void find_updates(block_symbolic& symbolic) {
 
 /// Computes the structure of the factor of a matrix with blocks at `places` and on the diagonal.
 /// @pre every place has indices less than `size` and is off the diagonal
-[[nodiscard]] inline block_symbolic analyze_blocks(std::size_t size, std::span<const block_place> places) {
+template <class = void>
+[[nodiscard]] block_symbolic analyze_blocks(std::size_t size, std::span<const block_place> places) {
   const block_adjacency graph{size, places};
   block_symbolic symbolic;
   const auto invert = [&] {

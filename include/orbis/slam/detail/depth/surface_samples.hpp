@@ -24,7 +24,8 @@ struct surface_sample {
 };
 
 /// Selects points on surfaces. Reuses its memory.
-class surface_sampler {
+template <class = void>
+class basic_surface_sampler {
  public:
   /// Selects at most `count` cells of a surface: the same number for every direction of normals (all cells of a
   /// direction if it has fewer), evenly spread over the image. O(cells).
@@ -66,5 +67,6 @@ class surface_sampler {
 
   std::array<std::vector<std::uint32_t>, bin_count> bins_;
 };
+using surface_sampler = basic_surface_sampler<>;
 
 }  // namespace orbis::slam::detail

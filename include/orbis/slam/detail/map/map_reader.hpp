@@ -29,6 +29,7 @@ inline constexpr double farthest_aside = 1e30;
 inline constexpr std::size_t bytes_of_keypoint = 76, bytes_of_observation = 8;
 
 /// Reads a pose exactly as written; empty if the numbers are not a valid pose.
+template <class = void>
 [[nodiscard]] inline std::optional<se3> take_pose(section_reader& from) {
   std::array<double, 7> v{};
   for (double& x : v) x = from.take<double>();
@@ -37,11 +38,13 @@ inline constexpr std::size_t bytes_of_keypoint = 76, bytes_of_observation = 8;
   if (!(largest_magnitude(t) < farthest) || !(std::abs(q.squaredNorm() - 1.0) < 1e-6)) return std::nullopt;
   return se3(so3::from_unit_quaternion(q), t);
 }
+template <class = void>
 [[nodiscard]] inline features::binary_descriptor<256> take_descriptor(section_reader& from) {
   features::binary_descriptor<256> d;
   for (std::uint64_t& w : d.words) w = from.take<std::uint64_t>();
   return d;
 }
+template <class = void>
 [[nodiscard]] inline vec3 take_vec3(section_reader& from) {
   const double x = from.take<double>(), y = from.take<double>();
   return {x, y, from.take<double>()};
@@ -49,6 +52,7 @@ inline constexpr std::size_t bytes_of_keypoint = 76, bytes_of_observation = 8;
 
 /// Reads a map section by section. Each function returns true if the section is valid and consistent with the preceding
 /// ones; otherwise `problem` describes the error.
+template <class = void>
 class map_reader {
  public:
   using content = map_content<features::binary_descriptor<256>>;

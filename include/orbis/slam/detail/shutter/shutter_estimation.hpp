@@ -142,7 +142,8 @@ template <camera::camera_model Camera>
 }
 
 /// Sums the equations of a run and decides which components are significant.
-class shutter_estimator {
+template <class = void>
+class basic_shutter_estimator {
  public:
   /// Adds the equations of a pair with a keyframe. O(keyframes added since).
   void add(map_keyframe keyframe, const shutter_equations& e) {
@@ -212,5 +213,6 @@ class shutter_estimator {
  private:
   std::vector<std::pair<map_keyframe, shutter_equations>> blocks_;
 };
+using shutter_estimator = basic_shutter_estimator<>;
 
 }  // namespace orbis::slam::detail

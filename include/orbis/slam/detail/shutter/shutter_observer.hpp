@@ -26,10 +26,12 @@ namespace orbis::slam::detail {
 
 /// Compares each tracked frame with the last keyframes once the next frame has been tracked, because the motion is
 /// determined from both neighbouring frames. Periodically proposes the resulting shutter.
-class shutter_observer {
+template <class = void>
+class basic_shutter_observer {
  public:
   /// `earlier`: see `options::earlier_estimate`.
-  explicit shutter_observer(const shutter_estimate& earlier) : estimate_{earlier, earlier}, decided_{earlier.observed} {
+  explicit basic_shutter_observer(const shutter_estimate& earlier)
+      : estimate_{earlier, earlier}, decided_{earlier.observed} {
     if (earlier.observed > 0.0) last_ = estimate_;
   }
 
@@ -181,5 +183,6 @@ class shutter_observer {
   double watched_ = 0.0, looked_ = 0.0;  ///< seconds
   double decided_;                       ///< duration of the observation behind the assumed shutter, seconds
 };
+using shutter_observer = basic_shutter_observer<>;
 
 }  // namespace orbis::slam::detail
