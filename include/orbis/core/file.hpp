@@ -34,19 +34,20 @@ namespace orbis::detail {
 /// Where the system supports it (Linux), the file has no name before the rename, so that no file remains if the process
 /// is killed. Otherwise its name is hidden. Names are unique per process and call, so that concurrent writers of the
 /// same file, in one process or in several, do not conflict.
-class temporary_file {
+template <class = void>
+class basic_temporary_file {
  public:
   /// Creates the file in the folder of `target`. If that fails, `exists()` is false and `errno` holds the reason.
-  explicit temporary_file(const std::filesystem::path& target) : folder_{target.parent_path()} {
+  explicit basic_temporary_file(const std::filesystem::path& target) : folder_{target.parent_path()} {
     if (!create_unnamed()) make_named([&] { return create(); });
   }
-  ~temporary_file() {
+  ~basic_temporary_file() {
     close();
     std::error_code ignored;
     if (is_named_) std::filesystem::remove(path_, ignored);
   }
-  temporary_file(const temporary_file&) = delete;
-  temporary_file& operator=(const temporary_file&) = delete;
+  basic_temporary_file(const basic_temporary_file&) = delete;
+  basic_temporary_file& operator=(const basic_temporary_file&) = delete;
 
   [[nodiscard]] bool exists() const noexcept { return is_named_ || is_unnamed_; }
   /// The path with which callers open the file; valid until the file is renamed.
@@ -142,6 +143,7 @@ class temporary_file {
   bool is_named_ = false;    ///< the file exists at path_
   bool is_unnamed_ = false;  ///< the file exists, without a name
 };
+using temporary_file = basic_temporary_file<>;
 
 }  // namespace orbis::detail
 

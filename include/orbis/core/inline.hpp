@@ -8,7 +8,9 @@
 /// In header-only use, every includer compiles the body of such a function, even if it does not call it. If the body is
 /// expensive, the function is declared with `ORBIS_LAZY` and defined with `ORBIS_LAZY_INLINE`: in header-only use it is
 /// a template, which is compiled only where it is called. Calls look the same; to pass the function as an argument, use
-/// a lambda expression. In `detail/`, `template <class = void>` has the same purpose.
+/// a lambda expression. In `detail`, `template <class = void>` has the same purpose; a class whose members are
+/// expensive is a class template `basic_x` with the alias `x`. None of this helps while a non-template function,
+/// constructor or member initialiser that every includer compiles calls the function.
 #pragma once
 
 #ifdef ORBIS_COMPILED

@@ -33,7 +33,7 @@ ORBIS_INLINE depth_store::depth_store(depth_store&&) noexcept = default;
 ORBIS_INLINE depth_store& depth_store::operator=(depth_store&&) noexcept = default;
 ORBIS_INLINE depth_store::~depth_store() = default;
 
-ORBIS_INLINE result<void> depth_store::put(std::uint64_t frame, image_view<const std::uint16_t> depth) {
+ORBIS_LAZY_INLINE result<void> depth_store::put(std::uint64_t frame, image_view<const std::uint16_t> depth) {
   const std::span<const std::byte> packed = encoder_.encode(depth);
   erase(frame);
   entry& e = entries_[frame];
@@ -45,7 +45,7 @@ ORBIS_INLINE result<void> depth_store::put(std::uint64_t frame, image_view<const
   return keep_budget();
 }
 
-ORBIS_INLINE result<void> depth_store::mask(std::uint64_t frame, image_view<const std::uint16_t> depth) {
+ORBIS_LAZY_INLINE result<void> depth_store::mask(std::uint64_t frame, image_view<const std::uint16_t> depth) {
   const auto at = entries_.find(frame);
   if (at == entries_.end()) return detail::not_stored(frame);
   const entry& e = at->second;
@@ -60,13 +60,13 @@ ORBIS_INLINE result<void> depth_store::mask(std::uint64_t frame, image_view<cons
   return {};
 }
 
-ORBIS_INLINE result<void> depth_store::get(std::uint64_t frame, image<std::uint16_t>& out) const {
+ORBIS_LAZY_INLINE result<void> depth_store::get(std::uint64_t frame, image<std::uint16_t>& out) const {
   auto done = get_whole(frame, out);
   if (done) detail::set_zeros(entries_.find(frame)->second.zeros, out.view());
   return done;
 }
 
-ORBIS_INLINE result<void> depth_store::get_whole(std::uint64_t frame, image<std::uint16_t>& out) const {
+ORBIS_LAZY_INLINE result<void> depth_store::get_whole(std::uint64_t frame, image<std::uint16_t>& out) const {
   const auto at = entries_.find(frame);
   if (at == entries_.end()) return detail::not_stored(frame);
   const entry& e = at->second;
@@ -79,7 +79,7 @@ ORBIS_INLINE result<void> depth_store::get_whole(std::uint64_t frame, image<std:
   return fail(std::move(why));
 }
 
-ORBIS_INLINE bool depth_store::erase(std::uint64_t frame) {
+ORBIS_LAZY_INLINE bool depth_store::erase(std::uint64_t frame) {
   const auto at = entries_.find(frame);
   if (at == entries_.end()) return false;
   bytes_in_memory_ -= at->second.in_memory.size();
@@ -96,7 +96,7 @@ ORBIS_INLINE bool depth_store::contains(std::uint64_t frame) const { return entr
 
 ORBIS_INLINE void depth_store::free_buffers() { encoder_ = {}; }
 
-ORBIS_INLINE result<void> depth_store::decode(const entry& e, image<std::uint16_t>& out) const {
+ORBIS_LAZY_INLINE result<void> depth_store::decode(const entry& e, image<std::uint16_t>& out) const {
   if (out.width() != e.width || out.height() != e.height) out = image<std::uint16_t>(e.width, e.height);
   detail::depth_decoder decoder;
   if (!e.spilled) return decoder.decode(e.in_memory, out.view());
@@ -104,7 +104,7 @@ ORBIS_INLINE result<void> depth_store::decode(const entry& e, image<std::uint16_
   return bytes ? decoder.decode(*bytes, out.view()) : result<void>{fail(bytes.error())};
 }
 
-ORBIS_INLINE bool depth_store::is_part_of_image(const entry& e, image_view<const std::uint16_t> depth) const {
+ORBIS_LAZY_INLINE bool depth_store::is_part_of_image(const entry& e, image_view<const std::uint16_t> depth) const {
   image<std::uint16_t> whole;
   if (!decode(e, whole)) return true;
   for (int y = 0; y != depth.height(); ++y)
@@ -113,7 +113,7 @@ ORBIS_INLINE bool depth_store::is_part_of_image(const entry& e, image_view<const
   return true;
 }
 
-ORBIS_INLINE result<void> depth_store::keep_budget() {
+ORBIS_LAZY_INLINE result<void> depth_store::keep_budget() {
   while (spills_ && bytes_in_memory_ > memory_budget_) {
     if (oldest_.empty()) list_uses();
     const use next = oldest_.back();
@@ -132,7 +132,7 @@ ORBIS_INLINE result<void> depth_store::keep_budget() {
   return {};
 }
 
-ORBIS_INLINE void depth_store::list_uses() {
+ORBIS_LAZY_INLINE void depth_store::list_uses() {
   for (const auto& [frame, e] : entries_)
     if (!e.spilled) oldest_.push_back({e.last_use, frame});
   std::sort(oldest_.begin(), oldest_.end(), [](const use& a, const use& b) { return a.when > b.when; });

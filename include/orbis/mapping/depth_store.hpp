@@ -18,6 +18,7 @@
 #include <vector>
 
 #include <orbis/core/image.hpp>
+#include <orbis/core/inline.hpp>
 #include <orbis/core/result.hpp>
 #include <orbis/mapping/detail/depth/depth_codec.hpp>
 #include <orbis/mapping/detail/depth/spill_file.hpp>
@@ -53,24 +54,24 @@ class depth_store {
   /// not be written to the spill file: the disk is full, the folder does not exist, or the file exists already. In that
   /// case nothing is lost: this image and the others stay in memory, beyond the budget, and the next call tries again.
   /// Linear in the number of pixels, about 1.3 ms for 640 x 480.
-  result<void> put(std::uint64_t frame, image_view<const std::uint16_t> depth);
+  ORBIS_LAZY result<void> put(std::uint64_t frame, image_view<const std::uint16_t> depth);
 
   /// Removes the pixels that are 0 in `depth` from the image of `frame`, in place of those removed by an earlier call.
   /// Only the runs of pixels without depth are stored; they stay in memory and do not count towards the budget. Errors:
   /// not_found; invalid_argument if the size of `depth` differs from that of the image. Linear in the number of pixels,
   /// about 0.2 ms for 640 x 480.
   /// @pre the other pixels of `depth` are those of the image
-  result<void> mask(std::uint64_t frame, image_view<const std::uint16_t> depth);
+  ORBIS_LAZY result<void> mask(std::uint64_t frame, image_view<const std::uint16_t> depth);
 
   /// Copies the image of `frame`, with 0 in removed pixels, to `out`, which is resized to the size of the image. A
   /// spilled image stays in the file. Errors: not_found; unreadable or malformed if the spill file fails or is damaged
   /// (`out` is then empty). Linear in the number of pixels, about 1 ms for 640 x 480.
-  result<void> get(std::uint64_t frame, image<std::uint16_t>& out) const;
+  ORBIS_LAZY result<void> get(std::uint64_t frame, image<std::uint16_t>& out) const;
   /// Like `get`, but includes the removed pixels.
-  result<void> get_whole(std::uint64_t frame, image<std::uint16_t>& out) const;
+  ORBIS_LAZY result<void> get_whole(std::uint64_t frame, image<std::uint16_t>& out) const;
 
   /// Removes the image of `frame`. Returns false if there is none.
-  bool erase(std::uint64_t frame);
+  ORBIS_LAZY bool erase(std::uint64_t frame);
 
   [[nodiscard]] bool contains(std::uint64_t frame) const;
   /// Frees the buffers of `put`; the next call to `put` allocates them again.
@@ -94,15 +95,15 @@ class depth_store {
     std::uint64_t when, frame;
   };
 
-  [[nodiscard]] result<void> decode(const entry& e, image<std::uint16_t>& out) const;
+  ORBIS_LAZY [[nodiscard]] result<void> decode(const entry& e, image<std::uint16_t>& out) const;
   /// Returns true if every pixel is 0 or equals that of the image, or if the image cannot be read. Does not count as
   /// a use of the image, so that the same images are spilled with and without assertions.
-  [[nodiscard]] bool is_part_of_image(const entry& e, image_view<const std::uint16_t> depth) const;
+  ORBIS_LAZY [[nodiscard]] bool is_part_of_image(const entry& e, image_view<const std::uint16_t> depth) const;
 
-  result<void> keep_budget();
+  ORBIS_LAZY result<void> keep_budget();
   /// Lists the images in memory, the most recently used first. Images used later are more recent than all listed
   /// ones.
-  void list_uses();
+  ORBIS_LAZY void list_uses();
 
   std::size_t memory_budget_;
   detail::spill_file file_;

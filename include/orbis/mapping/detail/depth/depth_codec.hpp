@@ -205,6 +205,7 @@ struct predict_row {
 class depth_encoder {
  public:
   /// Returns the compressed image, valid until the next call; at most 1 byte longer than the pixels. Linear.
+  template <class = void>
   [[nodiscard]] std::span<const std::byte> encode(image_view<const std::uint16_t> depth) {
     const std::size_t plain =
         1 + 2 * static_cast<std::size_t>(depth.width()) * static_cast<std::size_t>(depth.height());
@@ -225,6 +226,7 @@ class depth_encoder {
 
  private:
   /// Returns the number of bytes written, 0 if `out` is too small.
+  template <class = void>
   [[nodiscard]] std::size_t write_runs(image_view<const std::uint16_t> depth, std::span<std::byte> out) {
     out[0] = static_cast<std::byte>(depth_coding::runs);
     group_writer to{out.subspan(1)};
@@ -261,6 +263,7 @@ class depth_encoder {
   }
 
   /// Fills `rank_of_`, and writes the list of depths for the decoder.
+  template <class = void>
   void list_depths(image_view<const std::uint16_t> depth, group_writer& to) {
     constexpr std::size_t values = std::size_t{1} << 16U;
     rank_of_.assign(values, 0);
@@ -276,6 +279,7 @@ class depth_encoder {
     }
   }
 
+  template <class = void>
   void write_plain(image_view<const std::uint16_t> depth) {
     std::byte* to = out_.data();
     *to++ = static_cast<std::byte>(depth_coding::plain);
@@ -350,6 +354,7 @@ class depth_decoder {
  public:
   /// Decompresses an image into `out`, which must have the size of the image. Error: malformed; the content of `out` is
   /// then unspecified. Safe for any input bytes. Linear.
+  template <class = void>
   [[nodiscard]] result<void> decode(std::span<const std::byte> bytes, image_view<std::uint16_t> out) {
     if (bytes.empty()) return damaged("is empty");
     const auto coding = static_cast<depth_coding>(bytes.front());
@@ -367,6 +372,7 @@ class depth_decoder {
     return fail(errc::malformed, "compressed depth image", what);
   }
 
+  template <class = void>
   [[nodiscard]] static result<void> read_plain(std::span<const std::byte> bytes, image_view<std::uint16_t> out) {
     const auto columns = static_cast<std::size_t>(out.width());
     if (bytes.size() != 2 * columns * static_cast<std::size_t>(out.height())) return damaged("has the wrong length");
@@ -378,6 +384,7 @@ class depth_decoder {
     return {};
   }
 
+  template <class = void>
   [[nodiscard]] bool read_depths(group_reader& from) {
     constexpr std::uint32_t highest = std::numeric_limits<std::uint16_t>::max();
     const std::uint32_t count = from.get<step_bits>();
@@ -392,6 +399,7 @@ class depth_decoder {
     return true;
   }
 
+  template <class = void>
   [[nodiscard]] result<void> read_runs(group_reader& from, image_view<std::uint16_t> out) {
     constexpr std::size_t rows = restore_ranks::rows;
     const auto restore = simd::kernel<restore_ranks, std::uint32_t(const std::int32_t*, std::size_t, std::int32_t*)>();
@@ -432,7 +440,8 @@ class depth_decoder {
 };
 
 /// Encodes the zeros of an image: lengths of alternating runs of nonzero and zero pixels, row by row. O(pixels).
-[[nodiscard]] inline std::vector<std::byte> encode_zeros(image_view<const std::uint16_t> image) {
+template <class = void>
+[[nodiscard]] std::vector<std::byte> encode_zeros(image_view<const std::uint16_t> image) {
   std::vector<std::uint32_t> runs(1, 0);
   bool is_zero = false;
   for (int y = 0; y != image.height(); ++y)
@@ -452,7 +461,8 @@ class depth_decoder {
 }
 /// Sets to 0 the pixels that were 0 in the image from which `zeros` was encoded. O(pixels). @pre the images have the
 /// same size
-inline void set_zeros(std::span<const std::byte> zeros, image_view<std::uint16_t> image) {
+template <class = void>
+void set_zeros(std::span<const std::byte> zeros, image_view<std::uint16_t> image) {
   if (zeros.empty()) return;
   group_reader from{zeros};
   std::uint32_t left = from.get<step_bits>();

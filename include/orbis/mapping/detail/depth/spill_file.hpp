@@ -71,7 +71,8 @@ class free_ranges {
 
 /// Byte records in an unlinked temporary file, with their checksums in memory. Any number of threads may read
 /// concurrently while no thread writes.
-class spill_file {
+template <class = void>
+class basic_spill_file {
  public:
   struct record {
     std::uint64_t start = 0;
@@ -79,11 +80,11 @@ class spill_file {
   };
 
   /// Creates the file at `path` when the first record is written.
-  explicit spill_file(std::filesystem::path path) : path_{std::move(path)} {}
-  ~spill_file() { close(); }
-  spill_file(spill_file&& other) noexcept
+  explicit basic_spill_file(std::filesystem::path path) : path_{std::move(path)} {}
+  ~basic_spill_file() { close(); }
+  basic_spill_file(basic_spill_file&& other) noexcept
       : path_{std::move(other.path_)}, ranges_{std::move(other.ranges_)}, file_{std::exchange(other.file_, -1)} {}
-  spill_file& operator=(spill_file&& other) noexcept {
+  basic_spill_file& operator=(basic_spill_file&& other) noexcept {
     std::swap(path_, other.path_);
     std::swap(ranges_, other.ranges_);
     std::swap(file_, other.file_);
@@ -172,6 +173,7 @@ class spill_file {
   free_ranges ranges_;
   int file_ = -1;
 };
+using spill_file = basic_spill_file<>;
 
 }  // namespace orbis::mapping::detail
 #undef ORBIS_HAS_POSIX_FILES

@@ -37,7 +37,8 @@ struct map_job {
 
 /// A job queue. A limit on the number of images limits the whole queue, because between two images it holds at most one
 /// pose and one removal for each keyframe.
-class map_jobs {
+template <class = void>
+class basic_map_jobs {
  public:
   [[nodiscard]] bool empty() const noexcept { return jobs_.empty(); }
   [[nodiscard]] std::size_t size() const noexcept { return jobs_.size(); }
@@ -112,5 +113,6 @@ class map_jobs {
   std::deque<map_job> jobs_;
   std::size_t images_ = 0;
 };
+using map_jobs = basic_map_jobs<>;
 
 }  // namespace orbis::mapping::detail
