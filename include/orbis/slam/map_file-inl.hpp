@@ -128,13 +128,13 @@ ORBIS_LAZY_INLINE result<map> parse_map(std::span<const std::byte> bytes, const 
     return fail(errc::unsupported, where,
                 "version " + std::to_string(version) + "; only versions 1 to 4 are supported");
 
-  using reader = detail::map_reader<>;
-  reader::content parts;
-  reader read{parts, version};
+  detail::map_reader::content parts;
+  detail::map_reader read{parts, version};
   detail::section_finder next{text, head};
-  using section = std::pair<std::string_view, bool (reader::*)(detail::section_reader)>;
-  for (const auto& [name, take] : {section{"size", &reader::sizes}, section{"kfrm", &reader::keyframes},
-                                   section{"tree", &reader::tree}, section{"land", &reader::landmarks}}) {
+  using section = std::pair<std::string_view, bool (detail::map_reader::*)(detail::section_reader)>;
+  for (const auto& [name, take] :
+       {section{"size", &detail::map_reader::sizes}, section{"kfrm", &detail::map_reader::keyframes},
+        section{"tree", &detail::map_reader::tree}, section{"land", &detail::map_reader::landmarks}}) {
     const auto content = next.find(name);
     if (!content) return fail(errc::malformed, where, next.problem());
     if (!(read.*take)(*content)) return fail(errc::malformed, where, std::move(read.problem));

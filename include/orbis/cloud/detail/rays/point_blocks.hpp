@@ -14,8 +14,7 @@ namespace orbis::cloud::detail {
 
 /// The finite points of a cloud in the order of a space-filling curve, axis by axis. `block_size` consecutive points
 /// form a block, and `group_size` blocks form a group. The last block is padded with NaN.
-template <class = void>
-struct basic_point_blocks {
+struct point_blocks {
   static constexpr std::size_t block_size = 128;
   static constexpr std::size_t group_size = 16;
 
@@ -29,7 +28,6 @@ struct basic_point_blocks {
   std::vector<box> blocks{};
   std::vector<box> groups{};
 };
-using point_blocks = basic_point_blocks<>;
 
 /// Bounding box of several boxes. @pre boxes is not empty
 [[nodiscard]] inline point_blocks::box enclosing_box(std::span<const point_blocks::box> boxes) {

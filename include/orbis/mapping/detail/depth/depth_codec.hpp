@@ -202,10 +202,10 @@ struct predict_row {
 };
 
 /// Compresses depth images. Reuses its buffers, which take about 2 bytes per pixel plus 150 kB.
-class depth_encoder {
+template <class = void>
+class basic_depth_encoder {
  public:
   /// Returns the compressed image, valid until the next call; at most 1 byte longer than the pixels. Linear.
-  template <class = void>
   [[nodiscard]] std::span<const std::byte> encode(image_view<const std::uint16_t> depth) {
     const std::size_t plain =
         1 + 2 * static_cast<std::size_t>(depth.width()) * static_cast<std::size_t>(depth.height());
@@ -226,7 +226,6 @@ class depth_encoder {
 
  private:
   /// Returns the number of bytes written, 0 if `out` is too small.
-  template <class = void>
   [[nodiscard]] std::size_t write_runs(image_view<const std::uint16_t> depth, std::span<std::byte> out) {
     out[0] = static_cast<std::byte>(depth_coding::runs);
     group_writer to{out.subspan(1)};
@@ -263,7 +262,6 @@ class depth_encoder {
   }
 
   /// Fills `rank_of_`, and writes the list of depths for the decoder.
-  template <class = void>
   void list_depths(image_view<const std::uint16_t> depth, group_writer& to) {
     constexpr std::size_t values = std::size_t{1} << 16U;
     rank_of_.assign(values, 0);
@@ -279,7 +277,6 @@ class depth_encoder {
     }
   }
 
-  template <class = void>
   void write_plain(image_view<const std::uint16_t> depth) {
     std::byte* to = out_.data();
     *to++ = static_cast<std::byte>(depth_coding::plain);
@@ -296,6 +293,7 @@ class depth_encoder {
   std::vector<std::int32_t> expected_;      // predictions of the ranks of a row
   std::vector<std::uint8_t> wrong_;         // see predict_row
 };
+using depth_encoder = basic_depth_encoder<>;
 
 /// Computes the ranks of eight rows. Entry 8 t + i of `entries` belongs to column t - 2 i of row i.
 struct restore_ranks {
@@ -350,11 +348,11 @@ struct restore_ranks {
 };
 
 /// Decompresses depth images. Reuses its buffers: two bytes for each distinct depth, and 36 bytes per column.
-class depth_decoder {
+template <class = void>
+class basic_depth_decoder {
  public:
   /// Decompresses an image into `out`, which must have the size of the image. Error: malformed; the content of `out` is
   /// then unspecified. Safe for any input bytes. Linear.
-  template <class = void>
   [[nodiscard]] result<void> decode(std::span<const std::byte> bytes, image_view<std::uint16_t> out) {
     if (bytes.empty()) return damaged("is empty");
     const auto coding = static_cast<depth_coding>(bytes.front());
@@ -372,7 +370,6 @@ class depth_decoder {
     return fail(errc::malformed, "compressed depth image", what);
   }
 
-  template <class = void>
   [[nodiscard]] static result<void> read_plain(std::span<const std::byte> bytes, image_view<std::uint16_t> out) {
     const auto columns = static_cast<std::size_t>(out.width());
     if (bytes.size() != 2 * columns * static_cast<std::size_t>(out.height())) return damaged("has the wrong length");
@@ -384,7 +381,6 @@ class depth_decoder {
     return {};
   }
 
-  template <class = void>
   [[nodiscard]] bool read_depths(group_reader& from) {
     constexpr std::uint32_t highest = std::numeric_limits<std::uint16_t>::max();
     const std::uint32_t count = from.get<step_bits>();
@@ -399,7 +395,6 @@ class depth_decoder {
     return true;
   }
 
-  template <class = void>
   [[nodiscard]] result<void> read_runs(group_reader& from, image_view<std::uint16_t> out) {
     constexpr std::size_t rows = restore_ranks::rows;
     const auto restore = simd::kernel<restore_ranks, std::uint32_t(const std::int32_t*, std::size_t, std::int32_t*)>();
@@ -438,6 +433,7 @@ class depth_decoder {
   std::vector<std::int32_t> above_;    // ranks of a row
   std::vector<std::int32_t> entries_;  // see restore_ranks
 };
+using depth_decoder = basic_depth_decoder<>;
 
 /// Encodes the zeros of an image: lengths of alternating runs of nonzero and zero pixels, row by row. O(pixels).
 template <class = void>

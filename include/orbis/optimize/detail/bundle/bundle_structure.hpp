@@ -24,7 +24,8 @@ namespace orbis::optimize::detail {
 ///
 /// O(observations + pairs of observations of the same point + pairs of movable cameras). Memory: also one bit for each
 /// pair of movable cameras.
-class bundle_structure {
+template <class = void>
+class basic_bundle_structure {
  public:
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
   static constexpr std::size_t tile = 8;
@@ -127,7 +128,6 @@ class bundle_structure {
         by_point_[cursor_[at->other]++] = {at->observation, c};
   }
 
-  template <class = void>
   void number_cameras(std::size_t cameras, std::span<const std::uint8_t> fixed) {
     unknown.assign(cameras, none);
     camera.clear();
@@ -139,7 +139,6 @@ class bundle_structure {
   }
 
   /// Sorts points by their first and last movable cameras and by the number of their movable cameras.
-  template <class = void>
   void order_points(std::size_t points) {
     const auto n = static_cast<std::uint32_t>(unknowns());
     spans_.assign(points, {});
@@ -170,7 +169,6 @@ class bundle_structure {
     point_source.swap(moved_);
   }
 
-  template <class = void>
   void find_points_alike() {
     is_like_last_.assign(points(), 0);
     for (std::size_t p = 1; p < points(); ++p) {
@@ -187,7 +185,6 @@ class bundle_structure {
   }
 
   /// Divides the points into chunks. A chunk ends when it has enough observations, in total and per camera.
-  template <class = void>
   void lay_out(std::size_t cameras) {
     constexpr std::size_t enough = 2048, enough_of_camera = 48;
     segments.clear();
@@ -244,7 +241,6 @@ class bundle_structure {
     while (next != end && next - p < most && is_like_last_[next] != 0) ++next;
     return next;
   }
-  template <class = void>
   void place_group(std::size_t begin, std::size_t end) {
     group g;
     g.first_point = static_cast<std::uint32_t>(begin);
@@ -286,7 +282,6 @@ class bundle_structure {
     }
   }
 
-  template <class = void>
   void find_blocks() {
     const std::size_t n = unknowns();
     present_.assign((n * (n + 1) / 2 + 63) / 64, 0);
@@ -332,5 +327,6 @@ class bundle_structure {
   std::vector<std::uint64_t> present_;
   std::vector<std::uint32_t> rank_;
 };
+using bundle_structure = basic_bundle_structure<>;
 
 }  // namespace orbis::optimize::detail

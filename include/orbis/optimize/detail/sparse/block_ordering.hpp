@@ -56,9 +56,9 @@ class block_adjacency {
 /// the same neighbours), an element (eliminated; its list is the resulting clique), or `gone` (absorbed by another
 /// node).
 template <class = void>
-class quotient_graph {
+class basic_quotient_graph {
  public:
-  explicit quotient_graph(const block_adjacency& graph)
+  explicit basic_quotient_graph(const block_adjacency& graph)
       : size_{static_cast<std::uint32_t>(graph.size())},
         weight_(size_, 1),
         list_(size_),
@@ -287,12 +287,13 @@ class quotient_graph {
   std::uint32_t clique_weight_ = 0;
   std::uint32_t lowest_ = 0;
 };
+using quotient_graph = basic_quotient_graph<>;
 
 /// Returns an approximate minimum degree elimination order: `order[k]` is the k-th block to eliminate. Deterministic;
 /// about O(places) for meshes and pose graphs.
 template <class = void>
 [[nodiscard]] std::vector<std::uint32_t> minimum_degree_order(const block_adjacency& graph) {
-  return quotient_graph<>{graph}.eliminate_all();
+  return quotient_graph{graph}.eliminate_all();
 }
 
 }  // namespace orbis::optimize::detail

@@ -53,10 +53,10 @@ template <class = void>
 /// Reads a map section by section. Each function returns true if the section is valid and consistent with the preceding
 /// ones; otherwise `problem` describes the error.
 template <class = void>
-class map_reader {
+class basic_map_reader {
  public:
   using content = map_content<features::binary_descriptor<256>>;
-  map_reader(content& to, std::uint32_t version) : to_{to}, version_{version} {}
+  basic_map_reader(content& to, std::uint32_t version) : to_{to}, version_{version} {}
 
   std::string problem;
 
@@ -294,5 +294,6 @@ class map_reader {
   std::uint32_t keyframe_ids_ = 0, landmark_ids_ = 0;
   std::vector<std::pair<landmark_id, landmark_id>> replacements_;  ///< erased landmarks and their replacements
 };
+using map_reader = basic_map_reader<>;
 
 }  // namespace orbis::slam::detail
