@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <span>
 
 #include <orbis/core/random.hpp>
 #include <orbis/features/depth.hpp>
@@ -150,4 +151,28 @@ TEST_CASE("a few depths without an edge give their median") {
   const auto d = depth_at(camera::depth_view<float>{depth.view()}, 2.0F, 2.0F);
   REQUIRE(d);
   CHECK(d->z == Approx(1.001));
+}
+
+namespace {
+
+/// A depth source whose pixels are no image.
+struct own_depth {
+  [[nodiscard]] static int width() { return 7; }
+  [[nodiscard]] static int height() { return 5; }
+  [[nodiscard]] float operator()(int, int) const { return 1.0F; }
+  [[nodiscard]] static std::span<const float> pixels() { return {}; }
+};
+static_assert(camera::depth_source<own_depth>);
+
+}  // namespace
+
+TEST_CASE("the pixels of a depth can be fetched at any position, also outside the image") {
+  constexpr float infinite = std::numeric_limits<float>::infinity(), unknown = std::numeric_limits<float>::quiet_NaN();
+  const image<std::uint16_t> one_pixel(1, 1, std::uint16_t{1000}), empty, large(7, 5, std::uint16_t{1000});
+  for (const auto* pixels : {&one_pixel, &empty, &large})
+    for (const float x : {-infinite, -1.0F, -0.5F, 0.0F, 0.5F, 6.4F, 7.0F, infinite, unknown})
+      for (const float y : {-infinite, -1.0F, 0.0F, 1.0F, 3.9F, 4.0F, 5.0F, infinite, unknown})
+        features::prefetch_depth(camera::depth_view{*pixels, 1000.0}, x, y);
+  features::prefetch_depth(own_depth{}, 3.0F, 2.0F);
+  CHECK(depth_at(camera::depth_view{large, 1000.0}, 3.0F, 2.0F).value().z == Approx(1.0));
 }

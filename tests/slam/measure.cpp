@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <orbis/camera/pinhole.hpp>
@@ -113,6 +114,21 @@ TEST_CASE("The depth of a keypoint is read where the camera sees the same point 
     CHECK(f.as_read[i].stored_depth == f.depth[i]);
     const double shift = 35.0 * 0.04 / static_cast<double>(f.depth[i]);  // pixels to the left
     CHECK(static_cast<double>(f.depth[i] - f.as_read[i].depth) == Approx(0.02 * shift).epsilon(0.05));
+  }
+  // Many keypoints, some without depth, are read as one by one.
+  std::vector<slam::keypoint_as_read> many;
+  for (int i = 0; i != 100; ++i) {
+    many.push_back(f.as_read[static_cast<std::size_t>(i % 3)]);
+    many.back().x += 0.01F * static_cast<float>(i);
+    many.back().ray_x += 0.0003 * i;
+    if (i % 7 == 0) many.back().stored_depth = 0.0F;
+  }
+  std::vector<slam::keypoint_as_read> each = many;
+  const slam::frame_motion later{{.depth_delay = 0.02}, moving};
+  slam::follow_rows(rig, later, many, view);
+  for (std::size_t i = 0; i != each.size(); ++i) {
+    slam::follow_rows(rig, later, std::span{each}.subspan(i, 1), view);
+    CHECK(many[i].depth == each[i].depth);
   }
   // With rows of both images at one time there is nothing to follow.
   slam::detail::keep_as_read(f);

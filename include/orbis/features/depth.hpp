@@ -44,38 +44,59 @@ struct keypoint_depth {
 /// Least-squares plane through the depths of a window. Used by `depth_at`.
 class depth_plane {
  public:
-  /// Adds the depth `z` of a pixel at the offset (u, v) from the requested position.
-  void add(double u, double v, double z) noexcept {
+  /// Adds the depth `z` of a pixel at the offset (u, v) from the centre of the window. @pre the offsets are at most 3
+  void add(int u, int v, double z) noexcept {
     ++n_;
-    u_ += u, v_ += v, z_ += z;
-    uu_ += u * u, uv_ += u * v, vv_ += v * v;
-    uz_ += u * z, vz_ += v * z, zz_ += z * z;
+    u_ += u, v_ += v, uu_ += u * u, uv_ += u * v, vv_ += v * v;
+    z_ += z, uz_ += u * z, vz_ += v * z, zz_ += z * z;
   }
   /// Returns true if the pixels determine a plane: at least six that are not collinear.
-  [[nodiscard]] bool determined() const noexcept {
-    return n_ >= 6 && spread_uu() * spread_vv() - sq(spread_uv()) > 1.0;
-  }
+  [[nodiscard]] bool determined() const noexcept { return n_ >= 6 && determinant() > n_ * n_; }
 
-  /// The depth of the plane, its residual variance, and its slope in metres per pixel. @pre determined()
+  /// The depth of the plane, its residual variance, and its squared slope, in metres per pixel.
   struct fit {
-    double z, variance, slope;
+    double z, variance, squared_slope;
   };
-  [[nodiscard]] fit solve() const noexcept {
-    const double det = spread_uu() * spread_vv() - sq(spread_uv());
-    const double uz = uz_ - u_ * z_ / n_, vz = vz_ - v_ * z_ / n_;
-    const double a = (spread_vv() * uz - spread_uv() * vz) / det;
-    const double b = (spread_uu() * vz - spread_uv() * uz) / det;
-    const double rest = std::max(0.0, zz_ - z_ * z_ / n_ - a * uz - b * vz);
-    return {(z_ - a * u_ - b * v_) / n_, rest / (n_ - 3.0), std::hypot(a, b)};
+  /// Returns the plane at the offset (u, v). @pre determined()
+  [[nodiscard]] fit at(double u, double v) const noexcept {
+    const double n = n_, scale = 1.0 / determinant(), mean = 1.0 / n;
+    const double uz = n * uz_ - u_ * z_, vz = n * vz_ - v_ * z_;
+    const double a = scale * (spread_vv() * uz - spread_uv() * vz);
+    const double b = scale * (spread_uu() * vz - spread_uv() * uz);
+    const double rest = std::max(0.0, zz_ - mean * (z_ * z_ + a * uz + b * vz));
+    return {mean * (z_ - a * u_ - b * v_) + a * u + b * v, rest / (n - 3.0), a * a + b * b};
   }
 
  private:
-  [[nodiscard]] static double sq(double x) noexcept { return x * x; }
-  [[nodiscard]] double spread_uu() const noexcept { return uu_ - u_ * u_ / n_; }
-  [[nodiscard]] double spread_uv() const noexcept { return uv_ - u_ * v_ / n_; }
-  [[nodiscard]] double spread_vv() const noexcept { return vv_ - v_ * v_ / n_; }
-  double n_ = 0.0, u_ = 0.0, v_ = 0.0, z_ = 0.0, uu_ = 0.0, uv_ = 0.0, vv_ = 0.0, uz_ = 0.0, vz_ = 0.0, zz_ = 0.0;
+  // `n_` times the centred sums
+  [[nodiscard]] int spread_uu() const noexcept { return n_ * uu_ - u_ * u_; }
+  [[nodiscard]] int spread_uv() const noexcept { return n_ * uv_ - u_ * v_; }
+  [[nodiscard]] int spread_vv() const noexcept { return n_ * vv_ - v_ * v_; }
+  [[nodiscard]] int determinant() const noexcept { return spread_uu() * spread_vv() - spread_uv() * spread_uv(); }
+  int n_ = 0, u_ = 0, v_ = 0, uu_ = 0, uv_ = 0, vv_ = 0;
+  double z_ = 0.0, uz_ = 0.0, vz_ = 0.0, zz_ = 0.0;
 };
+
+namespace detail {
+
+struct window_pixel {
+  int x, y;
+};
+
+/// The pixel nearest to a position; empty if it is outside the image or the position is not finite.
+[[nodiscard]] inline std::optional<window_pixel> window_centre(float x, float y, int width, int height) noexcept {
+  if (!(x > -0.5F && y > -0.5F && x < static_cast<float>(width) - 0.5F && y < static_cast<float>(height) - 0.5F))
+    return std::nullopt;
+  // Rounds like lround, because x > -0.5; a sum in float would not be exact.
+  return window_pixel{static_cast<int>(static_cast<double>(x) + 0.5), static_cast<int>(static_cast<double>(y) + 0.5)};
+}
+
+template <class Depth>
+inline constexpr bool is_depth_view = false;
+template <class T>
+inline constexpr bool is_depth_view<camera::depth_view<T>> = true;
+
+}  // namespace detail
 
 /// Depth along the optical axis at a (subpixel) position `(x, y)`: the depth of a plane fitted to the valid depths
 /// around it, or their median if there are too few for a plane. The standard deviation combines the sensor noise, the
@@ -90,24 +111,24 @@ template <camera::depth_source Depth>
                                                      const keypoint_depth_options& options = {}) {
   constexpr int max_radius = 3;
   assert(options.radius >= 0 && options.radius <= max_radius);
-  if (!(x > -0.5F && y > -0.5F && x < static_cast<float>(depth.width()) - 0.5F &&
-        y < static_cast<float>(depth.height()) - 0.5F))
-    return std::nullopt;
-  // Rounds like lround, because x > -0.5; a sum in float would not be exact.
-  const int cx = static_cast<int>(static_cast<double>(x) + 0.5), cy = static_cast<int>(static_cast<double>(y) + 0.5);
+  const auto centre = detail::window_centre(x, y, depth.width(), depth.height());
+  if (!centre) return std::nullopt;
+  const auto [cx, cy] = *centre;
 
   struct valid_pixel {
-    int u, v;
+    int u, v;  // offset from the centre
     float z;
   };
   constexpr std::size_t most = (2 * max_radius + 1) * (2 * max_radius + 1);
   std::array<valid_pixel, most> valid;
   std::size_t count = 0;
   float least = std::numeric_limits<float>::max(), greatest = 0.0F;
+  depth_plane plane;
   for (int v = std::max(0, cy - options.radius); v <= std::min(depth.height() - 1, cy + options.radius); ++v)
     for (int u = std::max(0, cx - options.radius); u <= std::min(depth.width() - 1, cx + options.radius); ++u)
       if (const float metres = depth(u, v); metres > 0.0F) {
-        valid[count++] = {u, v, metres};
+        valid[count++] = {u - cx, v - cy, metres};
+        plane.add(u - cx, v - cy, static_cast<double>(metres));
         least = std::min(least, metres);
         greatest = std::max(greatest, metres);
       }
@@ -140,27 +161,37 @@ template <camera::depth_source Depth>
     if (static_cast<float>(end - begin) < options.min_share * static_cast<float>(count)) return std::nullopt;
     least = z[begin];
     greatest = z[end - 1];
+    plane = {};
+    for (std::size_t i = 0; i != count; ++i)
+      if (const valid_pixel& p = valid[i]; p.z >= least && p.z <= greatest)
+        plane.add(p.u, p.v, static_cast<double>(p.z));
   }
 
   const auto nearest = static_cast<double>(least), farthest = static_cast<double>(greatest);
-  depth_plane plane;
-  for (std::size_t i = 0; i != count; ++i) {
-    const valid_pixel& p = valid[i];
-    if (p.z < least || p.z > greatest) continue;
-    plane.add(static_cast<double>(p.u) - static_cast<double>(x), static_cast<double>(p.v) - static_cast<double>(y),
-              static_cast<double>(p.z));
-  }
   if (plane.determined()) {
-    const auto fit = plane.solve();
+    const auto fit = plane.at(static_cast<double>(x) - cx, static_cast<double>(y) - cy);
     const double at = std::clamp(fit.z, nearest, farthest);  // prevents extrapolation into a hole
-    const double noise = options.noise(at), shift = fit.slope * options.position_sigma;
-    return keypoint_depth{at, std::sqrt(noise * noise + fit.variance + shift * shift)};
+    const double noise = options.noise(at), by_position = options.position_sigma * options.position_sigma;
+    return keypoint_depth{at, std::sqrt(noise * noise + fit.variance + by_position * fit.squared_slope)};
   }
   if (is_even) sort();
   const std::size_t middle = begin + (end - begin) / 2;
   const auto upper = static_cast<double>(z[middle]);
   const double median = (end - begin) % 2 == 1 ? upper : 0.5 * (upper + static_cast<double>(z[middle - 1]));
   return keypoint_depth{median, std::hypot(options.noise(median), 0.5 * (farthest - nearest))};
+}
+
+/// Fetches into the cache the rows of pixels that `depth_at` reads at `(x, y)` with the default radius. If called some
+/// keypoints ahead, it halves the time of `depth_at` for images that are not in the cache. Does nothing near the border
+/// and outside the image, and for depth that is not a `depth_view`.
+template <camera::depth_source Depth>
+void prefetch_depth(const Depth& depth, float x, float y) {
+  if constexpr (detail::is_depth_view<Depth>) {
+    const auto pixels = depth.pixels();
+    const auto centre = detail::window_centre(x, y, pixels.width(), pixels.height());
+    if (!centre || centre->y == 0 || centre->y + 1 == pixels.height()) return;
+    for (int v = -1; v <= 1; ++v) __builtin_prefetch(&pixels(centre->x, centre->y + v));
+  }
 }
 
 }  // namespace orbis::features

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <concepts>
 #include <cstddef>
@@ -125,7 +126,12 @@ template <camera::camera_model Camera, feature_extractor Extractor, camera::dept
                                                                    image_view<const rgb8> color, const Depth& depth,
                                                                    image_memory& memory) {
   auto f = detail::make_frame(rig, memory.extract_with(extract, color), sensor_kind::rgbd);
+  constexpr std::size_t ahead = 8;
   for (std::size_t i = 0; i < f.size(); ++i) {
+    if (i + ahead < f.size()) {
+      const auto& later = f.features.keypoints[i + ahead];
+      features::prefetch_depth(depth, later.x, later.y);
+    }
     const auto& k = f.features.keypoints[i];
     if (!std::isnan(f.rays[i].x())) f.depth[i] = static_cast<float>(detail::usable_depth(rig, depth, k.x, k.y));
   }
@@ -146,20 +152,38 @@ template <camera::camera_model Camera, feature_extractor Extractor, camera::dept
 template <camera::camera_model Camera, camera::depth_source Depth>
 void follow_rows(const camera_rig<Camera>& rig, const frame_motion& m, std::span<keypoint_as_read> keypoints,
                  const Depth& depth) {
-  for (keypoint_as_read& k : keypoints) {
-    const double v = static_cast<double>(k.y);
-    const double later = m.shutter.depth_time(v, depth.height()) - m.shutter.color_time(v, depth.height());
-    if (later == 0.0 || !(k.stored_depth > 0.0F)) continue;
-    const auto stored = static_cast<double>(k.stored_depth);
-    const vec3 there = detail::moved_by(m.twist, -later, stored * vec3(k.ray_x, k.ray_y, 1.0));
-    const auto pixel = there.z() > 0.0 ? rig.camera().project(there) : std::nullopt;
-    const auto read = pixel ? features::depth_at(depth, static_cast<float>(pixel->x()), static_cast<float>(pixel->y()))
+  struct reading {
+    keypoint_as_read* keypoint;
+    double z;  // depth of the point at the time of the depth image, as stored
+    std::optional<vec2> pixel;
+  };
+  std::array<reading, 32> block;  // all pixels of a block are fetched before the first is read
+  while (!keypoints.empty()) {
+    std::size_t count = 0, taken = 0;
+    for (; taken != keypoints.size() && count != block.size(); ++taken) {
+      keypoint_as_read& k = keypoints[taken];
+      const double v = static_cast<double>(k.y);
+      const double later = m.shutter.depth_time(v, depth.height()) - m.shutter.color_time(v, depth.height());
+      if (later == 0.0 || !(k.stored_depth > 0.0F)) continue;
+      const vec3 there =
+          detail::moved_by(m.twist, -later, static_cast<double>(k.stored_depth) * vec3(k.ray_x, k.ray_y, 1.0));
+      const auto pixel = there.z() > 0.0 ? rig.camera().project(there) : std::nullopt;
+      if (pixel) features::prefetch_depth(depth, static_cast<float>(pixel->x()), static_cast<float>(pixel->y()));
+      block[count++] = {&k, there.z(), pixel};
+    }
+    keypoints = keypoints.subspan(taken);
+    for (std::size_t i = 0; i != count; ++i) {
+      const auto& [k, z_there, pixel] = block[i];
+      const auto read = pixel
+                            ? features::depth_at(depth, static_cast<float>(pixel->x()), static_cast<float>(pixel->y()))
                             : std::nullopt;
-    // If the two readings are from different surfaces, neither is reliable.
-    constexpr double same_surface = 0.1;
-    const double change = read ? read->z - there.z() : 0.0, z = stored + change;
-    const bool usable = read && std::abs(change) < same_surface * stored && z >= rig.min_depth && z <= rig.max_depth;
-    k.depth = usable ? static_cast<float>(z) : 0.0F;
+      // If the two readings are from different surfaces, neither is reliable.
+      constexpr double same_surface = 0.1;
+      const auto stored = static_cast<double>(k->stored_depth);
+      const double change = read ? read->z - z_there : 0.0, z = stored + change;
+      const bool usable = read && std::abs(change) < same_surface * stored && z >= rig.min_depth && z <= rig.max_depth;
+      k->depth = usable ? static_cast<float>(z) : 0.0F;
+    }
   }
 }
 
