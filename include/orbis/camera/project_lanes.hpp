@@ -14,6 +14,7 @@
 #include <utility>
 
 #include <orbis/camera/any.hpp>
+#include <orbis/camera/detail/distort.hpp>
 #include <orbis/camera/kannala_brandt.hpp>
 #include <orbis/camera/model.hpp>
 #include <orbis/camera/pinhole.hpp>
@@ -148,27 +149,18 @@ struct lanes_of<radial_tangential> {
   static ORBIS_ALWAYS_INLINE void project(const radial_tangential& camera, const L& px, const L& py, const L& z,
                                           lane_projection<L>& out) {
     const intrinsics& k = camera.k();
-    const radial_tangential::coefficients& d = camera.distortion();
     const L inverse = 1.0 / z, x = px * inverse, y = py * inverse;
-    const L xx = x * x, yy = y * y, xy = x * y, s = xx + yy;
-    const L numerator = 1.0 + s * (d.k1 + s * (d.k2 + s * d.k3));
-    const L reciprocal = 1.0 / (1.0 + s * (d.k4 + s * (d.k5 + s * d.k6)));
-    const L g = numerator * reciprocal;
-    const double p1 = d.p1, p2 = d.p2;
-    out.u = k.cx + k.fx * (g * x + 2.0 * p1 * xy + p2 * (s + 2.0 * xx));
-    out.v = k.cy + k.fy * (g * y + p1 * (s + 2.0 * yy) + 2.0 * p2 * xy);
-    out.valid = (L(0.0) < z) & (s < L(camera.max_squared_radius())) & is_finite(out.u, out.v);
+    const auto distorted = detail::distort<Jacobian>(camera.distortion(), x, y);
+    out.u = k.cx + k.fx * distorted.x;
+    out.v = k.cy + k.fy * distorted.y;
+    out.valid = (L(0.0) < z) & (x * x + y * y < L(camera.max_squared_radius())) & is_finite(out.u, out.v);
     if constexpr (Jacobian) {
-      const L dn = d.k1 + s * (2.0 * d.k2 + s * (3.0 * d.k3));
-      const L dq = d.k4 + s * (2.0 * d.k5 + s * (3.0 * d.k6));
-      const L dg = 2.0 * ((dn - g * dq) * reciprocal);
-      const L mixed = dg * xy + 2.0 * p1 * x + 2.0 * p2 * y;
       const L a = k.fx * inverse, b = k.fy * inverse;
-      out.j[0][0] = a * (g + dg * xx + 2.0 * p1 * y + 6.0 * p2 * x);
-      out.j[0][1] = a * mixed;
+      out.j[0][0] = a * distorted.by_xx;
+      out.j[0][1] = a * distorted.by_xy;
       out.j[0][2] = L(0.0) - (out.j[0][0] * x + out.j[0][1] * y);
-      out.j[1][0] = b * mixed;
-      out.j[1][1] = b * (g + dg * yy + 6.0 * p1 * y + 2.0 * p2 * x);
+      out.j[1][0] = b * distorted.by_xy;
+      out.j[1][1] = b * distorted.by_yy;
       out.j[1][2] = L(0.0) - (out.j[1][0] * x + out.j[1][1] * y);
     }
   }

@@ -15,6 +15,7 @@
 #include <optional>
 #include <utility>
 
+#include <orbis/camera/detail/distort.hpp>
 #include <orbis/camera/detail/monotonic.hpp>
 #include <orbis/camera/intrinsics.hpp>
 #include <orbis/core/types.hpp>
@@ -56,24 +57,23 @@ class radial_tangential {
   /// The pixel of a point in the camera frame (metres); empty for z <= 0, outside the domain, and for NaN.
   [[nodiscard]] std::optional<vec2> project(const vec3& p) const {
     if (!(p.z() > 0.0)) return std::nullopt;
-    return to_pixel({p.x() / p.z(), p.y() / p.z()});
+    const vec2 m{p.x() / p.z(), p.y() / p.z()};
+    return to_pixel(m, detail::distort<false>(d_, m.x(), m.y()));
   }
   /// The pixel of the point, and its derivative with respect to the point. If there is no pixel, `jacobian` is
   /// unchanged.
   [[nodiscard]] std::optional<vec2> project(const vec3& p, matrix<2, 3>& jacobian) const {
-    const auto pixel = project(p);
-    if (pixel) {
-      const double inverse_z = 1.0 / p.z();
-      const vec2 m{p.x() * inverse_z, p.y() * inverse_z};
-      const mat2 j = distort_derivative(m);
-      for (int i = 0; i != 2; ++i) {
-        const double focal = i == 0 ? k_.fx : k_.fy;
-        const double by_x = j(i, 0) * inverse_z * focal, by_y = j(i, 1) * inverse_z * focal;
-        jacobian(i, 0) = by_x;
-        jacobian(i, 1) = by_y;
-        jacobian(i, 2) = -(by_x * m.x() + by_y * m.y());
-      }
-    }
+    if (!(p.z() > 0.0)) return std::nullopt;
+    const vec2 m{p.x() / p.z(), p.y() / p.z()};
+    const auto d = detail::distort<true>(d_, m.x(), m.y());
+    const auto pixel = to_pixel(m, d);
+    if (!pixel) return std::nullopt;
+    const double a = k_.fx / p.z(), b = k_.fy / p.z();
+    jacobian(0, 0) = a * d.by_xx;
+    jacobian(0, 1) = a * d.by_xy;
+    jacobian(1, 0) = b * d.by_xy;
+    jacobian(1, 1) = b * d.by_yy;
+    for (int i = 0; i != 2; ++i) jacobian(i, 2) = -(jacobian(i, 0) * m.x() + jacobian(i, 1) * m.y());
     return pixel;
   }
   /// The ray through a pixel, scaled to z = 1, computed by Newton's method, which starts from the distorted position
@@ -92,16 +92,15 @@ class radial_tangential {
   friend struct detail::unproject_eight;
   static constexpr int max_iterations = 30;
   /// Threshold on the squared relative step. The remaining error is about the square of the last step.
-  static constexpr double converged = 1e-20;
+  static constexpr double converged = 1e-14;
 
   /// The ray that distorts to `target`, from the initial guess `m`; every step must stay in the domain.
   [[nodiscard]] std::optional<vec3> newton(const vec2& target, vec2 m) const {
     for (int i = 0; i != max_iterations; ++i) {
-      const vec2 d = distort(m);
-      const double u = d.x() - target.x(), v = d.y() - target.y();
-      const mat2 j = distort_derivative(m);
-      const double determinant = j(0, 0) * j(1, 1) - j(0, 1) * j(1, 0);
-      const double dx = (j(1, 1) * u - j(0, 1) * v) / determinant, dy = (j(0, 0) * v - j(1, 0) * u) / determinant;
+      const auto d = detail::distort<true>(d_, m.x(), m.y());
+      const double u = d.x - target.x(), v = d.y - target.y();
+      const double determinant = d.by_xx * d.by_yy - d.by_xy * d.by_xy, inverse = 1.0 / determinant;
+      const double dx = (d.by_yy * u - d.by_xy * v) * inverse, dy = (d.by_xx * v - d.by_xy * u) * inverse;
       m = {m.x() - dx, m.y() - dy};
       const double squared = m.x() * m.x() + m.y() * m.y();
       if (!(determinant > 0.0) || !(squared < domain_)) return std::nullopt;
@@ -110,10 +109,10 @@ class radial_tangential {
     return std::nullopt;
   }
 
-  [[nodiscard]] std::optional<vec2> to_pixel(const vec2& m) const {
+  /// The pixel of a point `m` on the plane z = 1. `distorted`: `m` after distortion.
+  [[nodiscard]] std::optional<vec2> to_pixel(const vec2& m, const detail::distorted_point<double>& distorted) const {
     if (!(m.x() * m.x() + m.y() * m.y() < domain_)) return std::nullopt;
-    const vec2 d = distort(m);
-    const vec2 pixel{k_.fx * d.x() + k_.cx, k_.fy * d.y() + k_.cy};
+    const vec2 pixel{k_.fx * distorted.x + k_.cx, k_.fy * distorted.y + k_.cy};
     if (!std::isfinite(pixel.x()) || !std::isfinite(pixel.y())) return std::nullopt;
     return pixel;
   }
@@ -126,24 +125,6 @@ class radial_tangential {
     const double dq = d_.k4 + s * (2.0 * d_.k5 + s * 3.0 * d_.k6);
     const double g = n / q;
     return {g, (dn - g * dq) / q};
-  }
-
-  [[nodiscard]] vec2 distort(const vec2& m) const noexcept {
-    const double x = m.x(), y = m.y(), s = x * x + y * y;
-    const double g = radial(s).first;
-    return {g * x + 2.0 * d_.p1 * x * y + d_.p2 * (s + 2.0 * x * x),
-            g * y + d_.p1 * (s + 2.0 * y * y) + 2.0 * d_.p2 * x * y};
-  }
-
-  [[nodiscard]] mat2 distort_derivative(const vec2& m) const noexcept {
-    const double x = m.x(), y = m.y();
-    const auto [g, dg] = radial(x * x + y * y);
-    const double mixed = 2.0 * (dg * x * y + d_.p1 * x + d_.p2 * y);
-    mat2 j;
-    j(0, 0) = g + 2.0 * dg * x * x + 2.0 * d_.p1 * y + 6.0 * d_.p2 * x;
-    j(0, 1) = j(1, 0) = mixed;
-    j(1, 1) = g + 2.0 * dg * y * y + 6.0 * d_.p1 * y + 2.0 * d_.p2 * x;
-    return j;
   }
 
   /// The ray that distorts to `target` without tangential distortion. If there is none, a ray near the boundary of the

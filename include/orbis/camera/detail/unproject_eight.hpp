@@ -5,6 +5,7 @@
 
 #include <limits>
 
+#include <orbis/camera/detail/distort.hpp>
 #include <orbis/camera/intrinsics.hpp>
 #include <orbis/camera/radial_tangential.hpp>
 #include <orbis/core/simd/dispatch.hpp>
@@ -27,17 +28,10 @@ struct unproject_eight {
     lanes x = target_x, y = target_y, found_x(std::numeric_limits<double>::quiet_NaN()), found_y = found_x;
     auto searches = x == x;
     for (int i = 0; i != radial_tangential::max_iterations && simd::any(searches); ++i) {
-      const lanes s = x * x + y * y;
-      const lanes n = 1.0 + s * (d.k1 + s * (d.k2 + s * d.k3)), dn = d.k1 + s * (2.0 * d.k2 + s * 3.0 * d.k3);
-      const lanes q = 1.0 + s * (d.k4 + s * (d.k5 + s * d.k6)), dq = d.k4 + s * (2.0 * d.k5 + s * 3.0 * d.k6);
-      const lanes g = n / q, dg = (dn - g * dq) / q;
-      const lanes u = g * x + 2.0 * d.p1 * x * y + d.p2 * (s + 2.0 * x * x) - target_x;
-      const lanes v = g * y + d.p1 * (s + 2.0 * y * y) + 2.0 * d.p2 * x * y - target_y;
-      const lanes mixed = 2.0 * (dg * x * y + d.p1 * x + d.p2 * y);
-      const lanes j00 = g + 2.0 * dg * x * x + 2.0 * d.p1 * y + 6.0 * d.p2 * x;
-      const lanes j11 = g + 2.0 * dg * y * y + 6.0 * d.p1 * y + 2.0 * d.p2 * x;
-      const lanes determinant = j00 * j11 - mixed * mixed;
-      const lanes dx = (j11 * u - mixed * v) / determinant, dy = (j00 * v - mixed * u) / determinant;
+      const auto p = distort<true>(d, x, y);
+      const lanes u = p.x - target_x, v = p.y - target_y;
+      const lanes determinant = p.by_xx * p.by_yy - p.by_xy * p.by_xy, inverse = 1.0 / determinant;
+      const lanes dx = (p.by_yy * u - p.by_xy * v) * inverse, dy = (p.by_xx * v - p.by_xy * u) * inverse;
       x = x - dx;
       y = y - dy;
       const lanes squared = x * x + y * y;
