@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <concepts>
 #include <optional>
+#include <type_traits>
 
 #include <orbis/camera/any.hpp>
 #include <orbis/camera/kannala_brandt.hpp>
@@ -58,4 +59,15 @@ static_assert(std::same_as<camera::checked_camera<orthographic>::type, orthograp
 TEST_CASE("any type with the members of a camera model is one") {
   CHECK(there_and_back(orthographic{}, {0.3, -0.2, 1.0}) < 1e-12);
   CHECK(there_and_back(camera::pinhole{640, 480, 500.0, 500.0, 320.0, 240.0}, {0.3, -0.2, 1.0}) < 1e-12);
+}
+
+TEST_CASE("A function gets the model of a camera that is known only at run time") {
+  const camera::intrinsics k{640, 480, 525.0, 525.0, 319.5, 239.5};
+  const auto is_fisheye = [](const auto& model) {
+    return std::same_as<std::remove_cvref_t<decltype(model)>, camera::kannala_brandt>;
+  };
+  CHECK(camera::with_model(camera::any_camera{camera::kannala_brandt{k, {}}}, is_fisheye));
+  CHECK(camera::with_model(camera::kannala_brandt{k, {}}, is_fisheye));
+  CHECK_FALSE(camera::with_model(camera::any_camera{camera::pinhole{k}}, is_fisheye));
+  CHECK(camera::with_model(orthographic{}, [](const orthographic& own) { return own.width(); }) == 640);
 }

@@ -5,6 +5,7 @@
 
 #include <concepts>
 #include <optional>
+#include <utility>
 
 #include <orbis/core/types.hpp>
 
@@ -54,5 +55,15 @@ struct checked_camera {
   static_assert(detail::unprojects<C>, "a camera model needs unproject(vec2), which returns std::optional<vec3>");
   using type = C;
 };
+
+/// Returns `f(camera)`, or `camera.visit(f)` for a camera whose model is known only at run time (`any_camera`): `f`
+/// then gets the model itself, which is faster in loops.
+template <camera_model Camera, class F>
+decltype(auto) with_model(const Camera& camera, F&& f) {
+  if constexpr (requires { camera.visit(f); })
+    return camera.visit(std::forward<F>(f));
+  else
+    return std::forward<F>(f)(camera);
+}
 
 }  // namespace orbis::camera

@@ -6,6 +6,7 @@
 #include <ranges>
 #include <utility>
 
+#include <orbis/camera/model.hpp>
 #include <orbis/cloud/detail/point_view.hpp>
 #include <orbis/cloud/ray_evidence.hpp>
 #include <orbis/cloud/ray_evidence_counter-inl.hpp>
@@ -13,25 +14,11 @@
 
 namespace orbis::cloud {
 
-namespace detail {
-
-/// Calls `f` with the camera; a camera type chosen at run time is resolved to its concrete model.
-template <camera::camera_model Camera, class F>
-decltype(auto) with_model(const Camera& camera, F&& f) {
-  if constexpr (requires { camera.visit([](const auto&) {}); }) {
-    return camera.visit(f);
-  } else {
-    return f(camera);
-  }
-}
-
-}  // namespace detail
-
 template <execution_policy Policy, point_range Points, posed_depth_range Views, camera::camera_model Camera>
 std::vector<ray_evidence> ray_evidence_scores(const Policy& policy, const Points& points, const Views& views,
                                               const Camera& camera, const ray_evidence_options& options,
                                               progress on_progress) {
-  return detail::with_model(camera, [&](const auto& model) {
+  return camera::with_model(camera, [&](const auto& model) {
     ray_evidence_counter counter{policy, points, model, options};
     std::size_t done = 0;
     const std::size_t total = (options.resolve_ghosts ? 2 : 1) * std::ranges::size(views);

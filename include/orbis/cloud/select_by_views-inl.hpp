@@ -6,6 +6,7 @@
 #include <cassert>
 #include <span>
 
+#include <orbis/camera/model.hpp>
 #include <orbis/cloud/detail/point_view.hpp>
 #include <orbis/cloud/detail/select/view_judge.hpp>
 #include <orbis/cloud/ray_evidence-inl.hpp>
@@ -32,7 +33,7 @@ automatic_result filter_automatically(const Policy& policy, const Points& points
   const auto& threads = detail::as_parallel(policy);
   const detail::viewed_points all{points};
   const detail::known_ranges ranges{threads, points, options};
-  return detail::with_model(camera, [&](const auto& model) {
+  return camera::with_model(camera, [&](const auto& model) {
     const auto judge = [&](std::span<char> left, filter_choice& choice) {
       return detail::judge_views(threads, all, views, model, options, left, choice, on_progress);
     };

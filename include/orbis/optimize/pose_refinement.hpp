@@ -61,12 +61,6 @@ struct pose_refinement {
 
 namespace detail {
 
-/// A camera whose model is known only at run time.
-template <class Camera>
-concept holds_a_model = requires(const Camera& camera) {
-  {camera.visit([](const auto&) {})};
-};
-
 template <class Camera>
 [[nodiscard]] pose_refinement refine_pose(std::span<const pose_observation> observations, const Camera& camera,
                                           double bf, const se3& T_world_camera, std::span<std::uint8_t> outliers,
@@ -86,13 +80,9 @@ template <camera::camera_model Camera>
                                           std::span<std::uint8_t> outliers, const pose_refinement_options& options = {},
                                           const huber& loss = {2.447}) {
   assert(outliers.size() == observations.size());
-  const auto refine = [&](const auto& camera) {
+  return camera::with_model(model.camera, [&](const auto& camera) {
     return detail::refine_pose(observations, camera, model.bf, T_world_camera, outliers, options, loss);
-  };
-  if constexpr (detail::holds_a_model<Camera>)
-    return model.camera.visit(refine);
-  else
-    return refine(model.camera);
+  });
 }
 
 }  // namespace orbis::optimize

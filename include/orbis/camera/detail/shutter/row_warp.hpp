@@ -151,8 +151,10 @@ class row_warp {
     const double shift = time.largest(camera.height()) * norm(head<3>(twist));
     constexpr double nearest = 0.25, largest_angle = 0.1;  // metres; angle that the shift subtends at the point
     most_inverse_ = shift > largest_angle * nearest ? largest_angle / shift : 1.0 / nearest;
-    for (std::size_t j = 0; j != down_; ++j)
-      for (std::size_t i = 0; i != across_; ++i) nodes_[j * across_ + i] = fit(camera, i, j);
+    with_model(camera, [&](const auto& model) {
+      for (std::size_t j = 0; j != down_; ++j)
+        for (std::size_t i = 0; i != across_; ++i) nodes_[j * across_ + i] = fit(model, i, j);
+    });
   }
 
   /// Computes the warped positions of the pixels of row `y` at their inverse depths. Entries of pixels without depth
@@ -190,14 +192,16 @@ class row_warp {
     return std::isfinite(sum);
   }
 
-  [[nodiscard]] std::optional<warped_pixel> exactly(const Camera& camera, const vec3& ray, double y,
+  template <camera_model Model>
+  [[nodiscard]] std::optional<warped_pixel> exactly(const Model& camera, const vec3& ray, double y,
                                                     double inverse_depth) const {
     if (!std::isfinite(ray.x())) return std::nullopt;
     return direction_ == warp_direction::to_frame ? warp_to_frame(camera, time_, twist_, ray, y, inverse_depth)
                                                   : warp_to_row(camera, time_, twist_, ray, y, inverse_depth);
   }
 
-  [[nodiscard]] warp_parabolas fit(const Camera& camera, std::size_t i, std::size_t j) const {
+  template <camera_model Model>
+  [[nodiscard]] warp_parabolas fit(const Model& camera, std::size_t i, std::size_t j) const {
     const double h = 0.5 * most_inverse_;
     std::array<vec3, 3> f;
     for (std::size_t k = 0; k != 3; ++k) {

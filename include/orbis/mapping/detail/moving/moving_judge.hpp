@@ -197,18 +197,14 @@ class moving_judge {
   void ask(const Policy& policy, view& about, const view& by, const se3& T_by_about) const {
     about.unjudged = true;
     const auto count = [](std::uint8_t& n) { n = static_cast<std::uint8_t>(n + (n != 255 ? 1 : 0)); };
-    const auto with_model = [&](const auto& model) {
+    camera::with_model(camera_, [&](const auto& model) {
       about.cells.ask(
           policy, by.cells, grid_, model, T_by_about, options_.slant,
           [&](float z) { return depth_margin(options_, z); },
           [&](std::size_t cell, visibility seen) {
             count(seen == visibility::through ? about.through[cell] : about.shown[cell]);
           });
-    };
-    if constexpr (requires { camera_.visit(with_model); })
-      camera_.visit(with_model);
-    else
-      with_model(camera_);
+    });
   }
   /// Also removes the neighbours of removed cells if they belong to the same surface, see moving_filter_options::grow.
   void grow(const view& v) {
