@@ -88,6 +88,8 @@ TEST_CASE("a copy of a view has its pixels and size, in memory that is used agai
   const image<int> wide{6, 1, 9};  // as many pixels, but another size
   copy_pixels(wide, copy);
   CHECK(copy == wide);
+  CHECK(image<int>{inside} == image<int>{image<int>{inside}.view()});
+  CHECK(std::ranges::equal(image<int>{inside}.pixels(), std::array{6, -1, 8, 11, 12, 13}));
   copy_pixels({}, copy);
   CHECK(copy.width() == 0);
   CHECK(copy.empty());

@@ -78,6 +78,11 @@ class image {
         pixels_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), value) {
     assert(width >= 0 && height >= 0);
   }
+  /// Copies the pixels of a view.
+  explicit image(image_view<const T> from) : width_{from.width()}, height_{from.height()} {
+    pixels_.reserve(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
+    for (int y = 0; y != height_; ++y) pixels_.insert(pixels_.end(), from.row(y).begin(), from.row(y).end());
+  }
 
   [[nodiscard]] int width() const noexcept { return width_; }
   [[nodiscard]] int height() const noexcept { return height_; }
@@ -106,8 +111,10 @@ class image {
 /// @pre `from` does not alias `to`
 template <class T>
 void copy_pixels(std::type_identity_t<image_view<const T>> from, image<T>& to) {
-  if (to.width() != from.width() || to.height() != from.height()) to = image<T>(from.width(), from.height());
-  for (int y = 0; y != from.height(); ++y) std::ranges::copy(from.row(y), to.row(y).begin());
+  if (to.width() != from.width() || to.height() != from.height())
+    to = image<T>(from);
+  else
+    for (int y = 0; y != from.height(); ++y) std::ranges::copy(from.row(y), to.row(y).begin());
 }
 
 }  // namespace orbis

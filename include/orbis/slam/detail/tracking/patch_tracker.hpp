@@ -58,11 +58,7 @@ class patch_tracker {
   [[nodiscard]] bool is_ready() const noexcept { return options_.enabled && !image_.empty(); }
 
   /// Returns a copy of the image. @pre is_ready()
-  [[nodiscard]] image<std::uint8_t> copy_image() const {
-    image<std::uint8_t> copy;
-    copy_pixels((*image_.levels)[0], copy);
-    return copy;
-  }
+  [[nodiscard]] image<std::uint8_t> copy_image() const { return image<std::uint8_t>{(*image_.levels)[0]}; }
 
   /// The exposure time, given or estimated, seconds.
   [[nodiscard]] double exposure() const noexcept { return options_.exposure.value_or(estimation_.exposure()); }
