@@ -130,6 +130,29 @@ TEST_CASE("Gradient and prior of the normal equations are those of their cost") 
     const double slope = (cost(h) - cost(-h)) / (2.0 * h);
     CHECK(std::abs(slope - at.g[k]) < 0.03 * (k < 6 ? at.g.head<6>().norm() : at.g.tail<6>().norm()));
   }
+  const auto without_derivatives =
+      linearize<false>(std::span<const row_observation>(seen), model, T_camera_world, motion, prior);
+  CHECK(without_derivatives.cost == Approx(at.cost).epsilon(1e-12));
+}
+
+TEST_CASE("The normal equations of pose and twist are the sum of the products of the derivatives") {
+  const auto seen = observations_of(60, 0.5);
+  const twist_prior prior = twist_prior::after({pose * se3::exp(-0.033 * motion), 0.8 * motion}, 0.033, true);
+  const se3 T_camera_world = pose.inverse();
+  // With a prior, and with no other observations, the equations are those of the prior.
+  Eigen::Matrix<double, 12, 12> sum =
+      linearize(std::span<const row_observation>(), model, T_camera_world, motion, prior).h;
+  for (const row_observation& o : seen) {
+    matrix<3, 6> by_pose;
+    const auto r = row_residual(model, T_camera_world, motion, o, by_pose);
+    REQUIRE(r);
+    Eigen::Matrix<double, 3, 12> j;
+    j << by_pose, -o.time * by_pose;
+    const double error = std::sqrt(r->squaredNorm() * o.seen.information);
+    sum += o.seen.information * std::min(1.0, slam::detail::row_loss_width / error) * j.transpose() * j;
+  }
+  const auto at = linearize(std::span<const row_observation>(seen), model, T_camera_world, motion, prior);
+  CHECK((at.h - sum).norm() < 1e-9 * sum.norm());
 }
 
 TEST_CASE("Early depth follows the refined twist as far as pixels determine it, and the former twist otherwise") {

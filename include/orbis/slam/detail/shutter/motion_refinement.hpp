@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include <orbis/camera/model.hpp>
@@ -19,6 +20,7 @@
 #include <orbis/optimize/reprojection.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/map/point_observation.hpp>
+#include <orbis/slam/detail/shutter/motion_sums.hpp>
 #include <orbis/slam/detail/shutter/row_times.hpp>
 #include <orbis/slam/frame.hpp>
 #include <orbis/slam/map.hpp>
@@ -111,15 +113,28 @@ template <feature_descriptor D>
 /// Width of the Huber loss for these residuals, in standard deviations: as in pose-only refinement.
 inline constexpr double row_loss_width = 2.447;
 
+/// Returns the residual of an observation, the observed point `q` in the camera frame at the time of its row and, if
+/// `WithDerivative`, the derivative with respect to this point; otherwise `by_point` is unchanged. Empty if the point
+/// has no projection.
+template <bool WithDerivative, camera::camera_model Camera>
+[[nodiscard]] std::optional<vec3> row_residual(const optimize::reprojection<Camera>& model, const se3& T_camera_world,
+                                               const vec6& twist, const row_observation& o, vec3& q, mat3& by_point) {
+  q = moved_by(twist, -o.time, T_camera_world * o.seen.point);
+  if constexpr (WithDerivative)
+    return model.residual(q, o.seen, by_point);
+  else
+    return model.residual(q, o.seen);
+}
+
 /// Returns the residual of an observation, and its derivative with respect to a motion of the camera frame (`exp(step)
 /// * T_camera_world`) at the time of its row; the derivative with respect to the twist is `-o.time` times that
 /// derivative. Empty if the point has no projection.
 template <camera::camera_model Camera>
 [[nodiscard]] std::optional<vec3> row_residual(const optimize::reprojection<Camera>& model, const se3& T_camera_world,
                                                const vec6& twist, const row_observation& o, matrix<3, 6>& j) {
-  const vec3 q = moved_by(twist, -o.time, T_camera_world * o.seen.point);
+  vec3 q;
   mat3 by_point;
-  const auto r = model.residual(q, o.seen, by_point);
+  const auto r = row_residual<true>(model, T_camera_world, twist, o, q, by_point);
   if (!r) return std::nullopt;
   j = side_by_side(by_point, -by_point * hat<double>(q));
   return r;
@@ -204,28 +219,37 @@ inline void add_terms(moving_pose_equations& e, const std::array<mat6, 3>& h, co
   return stacked(pose.value_or(zeros<vec6>()), zeros<vec6>());
 }
 
-template <camera::camera_model Camera>
+/// Returns the normal equations of pose and twist at a pose. If `WithDerivatives` is false, only their cost is
+/// computed.
+template <bool WithDerivatives = true, camera::camera_model Camera>
 [[nodiscard]] moving_pose_equations linearize(std::span<const row_observation> observations,
                                               const optimize::reprojection<Camera>& model, const se3& T_camera_world,
                                               const vec6& twist, const twist_prior& prior,
                                               const refinement_terms& terms = {}) {
   constexpr double width = row_loss_width;
   moving_pose_equations e;
-  std::array<mat6, 3> h{zeros<mat6>(), zeros<mat6>(), zeros<mat6>()};  // times 1, time, time squared
+  std::array<motion_sums, 3> sums;  // times 1, the negated time, and its square
   std::array<vec6, 2> g{zeros<vec6>(), zeros<vec6>()};
   for (const row_observation& o : observations) {
-    matrix<3, 6> j;
-    const auto r = row_residual(model, T_camera_world, twist, o, j);
+    vec3 q;
+    mat3 by_point;
+    const auto r = row_residual<WithDerivatives>(model, T_camera_world, twist, o, q, by_point);
     if (!r) continue;
     const double error = std::sqrt(squared_norm(*r) * o.seen.information);
     const double weight = o.seen.information * (error <= width ? 1.0 : width / error);
     e.cost += error <= width ? 0.5 * error * error : width * (error - 0.5 * width);
-    const matrix<6, 3> weighted = weight * transposed(j);
-    const mat6 a = weighted * j;
-    const vec6 b = weighted * *r;
-    h[0] += a, h[1] -= o.time * a, h[2] += o.time * o.time * a;
-    g[0] += b, g[1] -= o.time * b;
+    if constexpr (WithDerivatives) {
+      const mat3 weighted = weight * transposed(by_point);
+      motion_sums added = motion_sums::of_point(weighted * by_point, q);
+      for (motion_sums& sum : sums) {
+        sum += added;
+        added *= -o.time;
+      }
+      const vec6 slope = by_motion(weighted * *r, q);
+      g[0] += slope, g[1] -= o.time * slope;
+    }
   }
+  const std::array<mat6, 3> h{sums[0].matrix(), sums[1].matrix(), sums[2].matrix()};
   add_terms(e, h, g, T_camera_world, twist, prior, terms);
   return e;
 }
@@ -296,13 +320,11 @@ class early_depth_twist {
   mat6 gain_ = identity<mat6>();
 };
 
-/// Refines pose and twist, or only the pose, by Gauss-Newton steps as long as they reduce the cost. The observations
-/// should contain few outliers. O(observations) per step.
+/// As `refine_moving_pose`, for a camera whose model is known at compile time.
 template <camera::camera_model Camera>
-[[nodiscard]] moving_pose refine_moving_pose(std::span<const row_observation> observations,
-                                             const optimize::reprojection<Camera>& model, const moving_pose& start,
-                                             const twist_prior& prior, int iterations = 5,
-                                             const refinement_terms& terms = {}) {
+[[nodiscard]] moving_pose refine_with_model(std::span<const row_observation> observations,
+                                            const optimize::reprojection<Camera>& model, const moving_pose& start,
+                                            const twist_prior& prior, int iterations, const refinement_terms& terms) {
   se3 T_camera_world = start.T_world_camera.inverse();
   vec6 twist = start.twist;
   moving_pose_equations now = linearize(observations, model, T_camera_world, twist, prior, terms);
@@ -311,15 +333,32 @@ template <camera::camera_model Camera>
     if (!all_finite(step)) break;
     const se3 there = se3::exp(head<6>(step)) * T_camera_world;
     const vec6 moving = twist + tail<6>(step);
-    const moving_pose_equations then = linearize(observations, model, there, moving, prior, terms);
+    const auto linearized = [&](auto with_derivatives) {
+      return linearize<with_derivatives()>(observations, model, there, moving, prior, terms);
+    };
+    // The last step needs no derivatives. It is expected to be the last if its predicted gain is below the threshold.
+    constexpr double least_gain = 1e-5;  // fraction of the cost
+    const bool is_last = k + 1 == iterations || -0.5 * dot(step, now.g) < least_gain * now.cost;
+    const moving_pose_equations then = is_last ? linearized(std::false_type{}) : linearized(std::true_type{});
     if (!(then.cost < now.cost)) break;
-    const double gain = now.cost - then.cost;
     T_camera_world = there;
     twist = moving;
-    now = then;
-    if (gain < 1e-5 * now.cost) break;
+    if (k + 1 == iterations || now.cost - then.cost < least_gain * then.cost) break;
+    now = is_last ? linearized(std::true_type{}) : then;
   }
   return {T_camera_world.inverse(), twist};
+}
+
+/// Refines pose and twist, or only the pose, by Gauss-Newton steps as long as they reduce the cost. The observations
+/// should contain few outliers. O(observations) per step.
+template <camera::camera_model Camera>
+[[nodiscard]] moving_pose refine_moving_pose(std::span<const row_observation> observations,
+                                             const optimize::reprojection<Camera>& model, const moving_pose& start,
+                                             const twist_prior& prior, int iterations = 5,
+                                             const refinement_terms& terms = {}) {
+  return camera::with_model(model.camera, [&](const auto& camera) {
+    return refine_with_model(observations, optimize::reprojection{camera, model.bf}, start, prior, iterations, terms);
+  });
 }
 
 }  // namespace orbis::slam::detail

@@ -27,6 +27,7 @@
 #include <orbis/core/types.hpp>
 #include <orbis/optimize/reprojection.hpp>
 #include <orbis/slam/camera_rig.hpp>
+#include <orbis/slam/detail/shutter/motion_sums.hpp>
 #include <orbis/slam/detail/shutter/row_times.hpp>
 #include <orbis/slam/frame.hpp>
 #include <orbis/slam/ids.hpp>
@@ -82,7 +83,7 @@ template <camera::camera_model Camera>
     return vec3(cross(vec3(twist[3], twist[4], twist[5]), p) + vec3(twist[0], twist[1], twist[2]));
   };
   const se3 T_to_from = to.T_world_camera.inverse() * from.T_world_camera;
-  mat6 pose = zeros<mat6>();
+  motion_sums pose;
   matrix<6, 2> mixed = zeros<matrix<6, 2>>();
   vec6 pose_gradient = zeros<vec6>();
   shutter_equations e;
@@ -105,7 +106,6 @@ template <camera::camera_model Camera>
     const double information = std::min(from.information[at->second], to.information[i]);
     const double error = std::sqrt(squared_norm(*r) * information);
     const double weight = information * (error <= width ? 1.0 : width / error);
-    const matrix<3, 6> by_pose = side_by_side(by_point, -by_point * hat<double>(q));
     const depth_change change_a = a.change.if_even(a.depth), change_b = b.change.if_even(b.depth);
     matrix<3, 2> by_shutter;
     set_column(
@@ -115,9 +115,11 @@ template <camera::camera_model Camera>
     const double z = static_cast<double>(b.depth);
     const double by_depth = o.has_depth() ? rig.model.bf / (z * z) : 0.0;  // derivative of the measured depth
     by_shutter(2, 1) -= by_depth * change_b.rate();
-    pose += weight * (transposed(by_pose) * by_pose);
-    mixed += weight * (transposed(by_pose) * by_shutter);
-    pose_gradient += weight * (transposed(by_pose) * *r);
+    const mat3 weighted = weight * transposed(by_point);
+    const matrix<3, 2> by_both = weighted * by_shutter;
+    pose += motion_sums::of_point(weighted * by_point, q);
+    for (int k = 0; k != 2; ++k) set_column(mixed, k, vec6(column_of(mixed, k) + by_motion(column_of(by_both, k), q)));
+    pose_gradient += by_motion(weighted * *r, q);
     e.h += weight * (transposed(by_shutter) * by_shutter);
     gradient += weight * (transposed(by_shutter) * *r);
     ++count;
@@ -136,7 +138,7 @@ template <camera::camera_model Camera>
     gradient[1] += weight * ((later - earlier) / (4.0 * step) - by_shutter(2, 1) * (*r)[2]);
   }
   if (count < enough) return std::nullopt;
-  if (!eliminate_pose(e, gradient, pose, mixed, pose_gradient)) return std::nullopt;
+  if (!eliminate_pose(e, gradient, pose.matrix(), mixed, pose_gradient)) return std::nullopt;
   e.c = e.h * vec2(shutter.color_read_out, shutter.depth_delay) - gradient;
   return e;
 }
