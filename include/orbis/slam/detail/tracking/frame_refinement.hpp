@@ -3,6 +3,7 @@
 /// Refinement of a frame with a roughly known pose, using the landmarks around it, their patches, and depth.
 #pragma once
 
+#include <cassert>
 #include <cstddef>
 #include <optional>
 #include <span>
@@ -14,6 +15,7 @@
 #include <orbis/slam/detail/shutter/motion_refinement.hpp>
 #include <orbis/slam/detail/shutter/row_times.hpp>
 #include <orbis/slam/ids.hpp>
+#include <orbis/slam/measure.hpp>
 
 namespace orbis::slam::detail {
 
@@ -77,7 +79,11 @@ class frame_refinement {
     if (!rolls && with_depth) find_row_observations(f, m, c_.rig, rows_);
     for (int round = 0; round != rounds; ++round) {
       if (rolls) {
-        t.read_rows(f.as_read, {f.shutter, refined.twist});  // depth was read assuming the previous motion
+        // Depth was read assuming the previous motion; only the last round reads that of keypoints without landmarks.
+        if (round + 1 == rounds)
+          t.read_rows(f.as_read, {f.shutter, refined.twist});
+        else
+          read_observed(t, {f.shutter, refined.twist});
         find_row_observations(f, m, c_.rig, rows_);
       }
       if (with_depth) c_.depth_quadratic = c_.depth.term_at(refined, f.shutter);
@@ -112,9 +118,23 @@ class frame_refinement {
   }
 
  private:
+  /// Reads the row measurements of the keypoints that observe landmarks again. @pre `as_read` has all keypoints
+  void read_observed(const task& t, const frame_motion& motion) {
+    frame_type& f = t.frame;
+    assert(f.as_read.size() == f.size());
+    observed_.clear();
+    for (std::size_t i = 0; i != f.size(); ++i)
+      if (f.landmarks[i] != no_id) observed_.push_back(f.as_read[i]);
+    t.read_rows(observed_, motion);
+    auto read = observed_.begin();
+    for (std::size_t i = 0; i != f.size(); ++i)
+      if (f.landmarks[i] != no_id) f.as_read[i] = *read++;
+  }
+
   Context& c_;
   early_depth_twist early_depth_;
-  std::vector<row_observation> rows_;  ///< reused working memory
+  std::vector<row_observation> rows_;       ///< reused working memory
+  std::vector<keypoint_as_read> observed_;  ///< reused working memory
 };
 
 }  // namespace orbis::slam::detail
