@@ -191,12 +191,12 @@ class voxel_sums {
     /// Looks up one point at a time; fast if most points are in the same brick as the previous one.
     class reader {
      public:
-      explicit reader(const choice& of) noexcept : of_{&of} {}
+      explicit reader(const choice& of) noexcept : of_{&of}, steps_per_metre_{1024.0 / of.sums_->size_} {}
       /// Returns true if the voxel that contains the point (world frame, metres) was chosen, false if not; empty if the
       /// voxel is not occupied.
       [[nodiscard]] std::optional<bool> find(const vec3& point) {
         detail::brick_place at;
-        if (!detail::locate(point, 1024.0 / of_->sums_->size_, at)) return std::nullopt;
+        if (!detail::locate(point, steps_per_metre_, at)) return std::nullopt;
         if (at.brick != brick_ || !asked_) {
           asked_ = true;
           brick_ = at.brick;
@@ -208,6 +208,7 @@ class voxel_sums {
 
      private:
       const choice* of_;
+      double steps_per_metre_;
       bool asked_ = false;
       detail::voxel_key brick_{};  ///< brick of the last point
       std::uint32_t number_ = 0;   ///< index of `brick_`
