@@ -147,6 +147,15 @@ void check_correction(const Camera& camera) {
   const camera::depth_view corrected{depth};
   REQUIRE(correct.color(rolling, swing(), corrected, read.color.view(), color.view()));
   CHECK(compare(color, truth.color, depth) < 0.35 * compare(read.color, truth.color, depth));  // of the nearest pixel
+
+  const rgb8 unchanged{1, 2, 3};
+  image<rgb8> every_third(camera.width(), camera.height(), unchanged);
+  REQUIRE(correct.color(rolling, swing(), corrected, read.color.view(), every_third.view(), 3));
+  for (int y = 0; y != camera.height(); ++y) {
+    const auto is_unchanged = [&](const rgb8& pixel) { return pixel == unchanged; };
+    CHECK((y % 3 == 0 ? std::ranges::equal(every_third.row(y), color.row(y))
+                      : std::ranges::all_of(every_third.row(y), is_unchanged)));
+  }
 }
 
 image<std::uint16_t> in_units(const image<float>& metres, double scale) {

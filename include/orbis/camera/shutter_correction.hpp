@@ -125,23 +125,24 @@ class shutter_correction {
   /// Computes the colour image that belongs to a corrected depth image: each pixel gets the colour read at the position
   /// where its point was observed; a pixel without depth is treated as a point at a large distance; positions outside
   /// the image are black. If the camera does not move, or all rows are read at the frame's time, the image is copied.
-  /// Errors and preconditions: those of `depth`. O(pixels).
+  /// Only every `row_step`-th row of `out`, from the first, is changed. Errors and preconditions: those of `depth`.
+  /// O(pixels). @pre row_step > 0
   template <depth_source Depth>
   [[nodiscard]] result<void> color(const shutter& s, const vec6& twist, const Depth& corrected,
-                                   image_view<const rgb8> color, image_view<rgb8> out) {
-    assert(has_size(corrected) && has_size(color) && has_size(out));
+                                   image_view<const rgb8> color, image_view<rgb8> out, int row_step = 1) {
+    assert(has_size(corrected) && has_size(color) && has_size(out) && row_step > 0);
     const int width = camera_.width(), height = camera_.height();
     const auto time = detail::row_time::of_color(s, height);
     if (auto usable = check(time, twist); !usable) return usable;
     if (time.is_zero() || !is_needed(s, twist)) {
-      for (int y = 0; y != height; ++y) std::ranges::copy(color.row(y), out.row(y).begin());
+      for (int y = 0; y < height; y += row_step) std::ranges::copy(color.row(y), out.row(y).begin());
       return {};
     }
     to_row_.assign(camera_, time, twist);
     std::ranges::fill(surface_, 0.0F);
     const auto stride = static_cast<std::int32_t>(color.stride());
     const auto nearest_pixels = simd::kernel<detail::nearest_pixels_kernel, detail::nearest_pixels_kernel::signature>();
-    for (int y = 0; y != height; ++y) {
+    for (int y = 0; y < height; y += row_step) {
       for (int x = 0; x != width; ++x) metres_[static_cast<std::size_t>(x)] = corrected(x, y);
       for (std::size_t x = 0; x != static_cast<std::size_t>(width); ++x)
         surface_[x] = detail::inverse_depth(metres_[x]);
