@@ -56,7 +56,7 @@ class color_file {
   bool get(std::uint64_t number, orbis::image<orbis::rgb8>& out) const {
     const auto found = at_.find(number);
     if (found == at_.end()) return false;
-    std::vector<orbis::rgb8> pixels = sample(out);
+    std::vector<orbis::rgb8> pixels(samples(out.height()) * samples(out.width()));
     const std::size_t bytes = pixels.size() * sizeof(orbis::rgb8);
     if (::pread(file_, pixels.data(), bytes, offset(found->second, bytes)) != static_cast<ssize_t>(bytes)) return false;
     auto from = pixels.begin();
@@ -66,9 +66,11 @@ class color_file {
   }
 
  private:
+  /// Number of stored pixels of a row or column.
+  [[nodiscard]] std::size_t samples(int size) const { return static_cast<std::size_t>((size + stride_ - 1) / stride_); }
   [[nodiscard]] std::vector<orbis::rgb8> sample(const orbis::image<orbis::rgb8>& color) const {
     std::vector<orbis::rgb8> pixels;
-    pixels.reserve(color.pixels().size() / static_cast<std::size_t>(stride_) + 1);
+    pixels.reserve(samples(color.height()) * samples(color.width()));
     for (int y = 0; y < color.height(); y += stride_)
       for (int x = 0; x < color.width(); x += stride_) pixels.push_back(color(x, y));
     return pixels;

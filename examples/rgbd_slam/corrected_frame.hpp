@@ -14,12 +14,16 @@
 
 namespace app {
 
+/// Distance in pixels between the rows and columns whose pixels become points.
+inline constexpr int point_stride = 2;
+
 class frame_correction {
  public:
   explicit frame_correction(orbis::camera::any_camera camera) : correct_{std::move(camera)} {}
 
   /// The frame as a global shutter would have captured it; the frame itself if no correction is needed or the camera
-  /// moved too fast. `m`: the shutter of the frame, and the motion during the read-out. Valid until the next call.
+  /// moved too fast. Only rows whose pixels become points have valid colours. `m`: the shutter of the frame, and the
+  /// motion during the read-out. Valid until the next call.
   [[nodiscard]] const orbis::camera::rgbd_frame& operator()(const orbis::camera::rgbd_frame& frame,
                                                             const orbis::slam::frame_motion& m) {
     if (!correct_.is_needed(m.shutter, m.twist)) return frame;
@@ -30,18 +34,18 @@ class frame_correction {
     corrected_.timestamp = frame.timestamp;
     corrected_.depth_scale = frame.depth_scale;
     corrected_.T_world_camera = frame.T_world_camera;
-    const bool done =
-        correct_.depth(m.shutter, m.twist, frame.depth_metres(), corrected_.depth.view()) &&
-        correct_.color(m.shutter, m.twist, corrected_.depth_metres(), frame.color.view(), corrected_.color.view());
+    const bool done = correct_.depth(m.shutter, m.twist, frame.depth_metres(), corrected_.depth.view()) &&
+                      correct_.color(m.shutter, m.twist, corrected_.depth_metres(), frame.color.view(),
+                                     corrected_.color.view(), point_stride);
     return done ? corrected_ : frame;
   }
 
-  /// Corrects the colours of a frame whose depth is already corrected.
+  /// Corrects the colours of the rows that become points; other rows become black. The depth is already corrected.
   void correct_color(const orbis::camera::depth_view<std::uint16_t>& corrected, const orbis::slam::frame_motion& m,
                      orbis::image<orbis::rgb8>& color) {
     if (!correct_.is_needed(m.shutter, m.twist)) return;
     orbis::image<orbis::rgb8> out(color.width(), color.height());
-    if (correct_.color(m.shutter, m.twist, corrected, color.view(), out.view())) color = std::move(out);
+    if (correct_.color(m.shutter, m.twist, corrected, color.view(), out.view(), point_stride)) color = std::move(out);
   }
 
  private:

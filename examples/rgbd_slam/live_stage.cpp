@@ -88,20 +88,20 @@ void live_mapping::note(const orbis::mapping::insertion_event& e) {
 }
 
 void live_mapping::add(std::size_t frame, orbis::slam::map_keyframe keyframe, const orbis::se3& T_world_camera,
-                       const orbis::camera::rgbd_frame& image) {
+                       const orbis::image<std::uint16_t>& depth) {
   {
     const std::lock_guard lock{mutex_};
     made_.push_back({frame, keyframe});
   }
-  live_.add_keyframe(frame, pixels_view{image.depth, depth_scale_}, T_world_camera);
+  live_.add_keyframe(frame, pixels_view{depth, depth_scale_}, T_world_camera);
   // The map's thread may have removed the keyframe from made_ before the keyframe was in the map.
   if (!find([&](const made& k) { return k.frame == frame; })) live_.remove(frame);
   if (waits_) live_.wait();
 }
 
 void live_mapping::add_frame(std::size_t frame, std::uint64_t reference, const orbis::se3& T_reference_camera,
-                             const orbis::camera::rgbd_frame& image) {
-  live_.add_frame(frame, pixels_view{image.depth, depth_scale_}, reference, T_reference_camera);
+                             const orbis::image<std::uint16_t>& depth) {
+  live_.add_frame(frame, pixels_view{depth, depth_scale_}, reference, T_reference_camera);
   if (waits_) live_.wait();
 }
 

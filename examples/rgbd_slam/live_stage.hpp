@@ -48,11 +48,11 @@ class live_mapping {
   void tracked(std::size_t frame) { newest_ = frame; }
   /// Adds the frame with index `frame`, which has become a keyframe.
   void add(std::size_t frame, orbis::slam::map_keyframe keyframe, const orbis::se3& T_world_camera,
-           const orbis::camera::rgbd_frame& image);
+           const orbis::image<std::uint16_t>& depth);
   /// Adds the tracked frame with index `frame`, which is not a keyframe; its pose follows the keyframe of the frame
   /// `reference`.
   void add_frame(std::size_t frame, std::uint64_t reference, const orbis::se3& T_reference_camera,
-                 const orbis::camera::rgbd_frame& image);
+                 const orbis::image<std::uint16_t>& depth);
   /// The frame index of the newest keyframe for which `is_wanted(made)` is true.
   template <class IsWanted>
   [[nodiscard]] std::optional<std::uint64_t> find(const IsWanted& is_wanted) const {

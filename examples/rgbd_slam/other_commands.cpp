@@ -84,7 +84,7 @@ orbis::result<posed_frames> frames_with_poses(const frame_source& source, const 
       motion.shutter.depth_delay += depth_delay;
       const orbis::camera::rgbd_frame& at_once = correct(*frame, motion);
       posed.add(i, T_world_truth * *frame->T_world_camera, &at_once == &*frame ? orbis::slam::frame_motion{} : motion,
-                smooth(at_once, motion));
+                smooth(at_once.depth, motion), at_once.color);
     }
     console.advance(i + 1, source.frames);
   }

@@ -5,6 +5,7 @@
 /// One frame at a time is unpacked, while another thread unpacks the next one.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -31,9 +32,6 @@ namespace app {
 /// The name of the spill file in the folder of new files. The file is unlinked as soon as it is open.
 inline constexpr const char* spill_name = ".rgbd_slam.depths";  // no result may have this name
 
-/// Distance in pixels between the rows and columns whose pixels become points.
-inline constexpr int point_stride = 2;
-
 /// The maximum size of the colour file if colours can be read again.
 inline constexpr std::uint64_t most_color_bytes = std::uint64_t{256} << 20U;
 
@@ -57,14 +55,14 @@ class posed_frames {
 
   /// Adds frame `i` of the source with its pose. `corrected_by`: see the overload for keyframes.
   void add(std::size_t i, const orbis::se3& T_world_camera, const orbis::slam::frame_motion& corrected_by,
-           const orbis::camera::rgbd_frame& frame) {
-    add({i, {}, T_world_camera, corrected_by}, frame);
+           const orbis::image<std::uint16_t>& depth, const orbis::image<orbis::rgb8>& color) {
+    add({i, {}, T_world_camera, corrected_by}, depth, color);
   }
   /// Adds frame `i` of the source, a keyframe whose pose is set later by `place`. `corrected_by`: the camera motion for
   /// which its images were corrected; zero if they are unchanged images of the source.
   void add(std::size_t i, orbis::slam::map_keyframe keyframe, const orbis::slam::frame_motion& corrected_by,
-           const orbis::camera::rgbd_frame& frame) {
-    add({i, keyframe, {}, corrected_by}, frame);
+           const orbis::image<std::uint16_t>& depth, const orbis::image<orbis::rgb8>& color) {
+    add({i, keyframe, {}, corrected_by}, depth, color);
   }
   /// Sets the pose of each frame to `where(keyframe)` and drops frames without a pose.
   template <class Where>
@@ -145,6 +143,7 @@ class posed_frames {
   };
   [[nodiscard]] iterator begin() const {
     depths_->finish();
+    spare_.clear();  // of a pass that did not reach its end
     return {*this, 0};
   }
   [[nodiscard]] iterator end() const { return {*this, size()}; }
@@ -164,10 +163,10 @@ class posed_frames {
     orbis::slam::frame_motion corrected_by;
   };
 
-  void add(const entry& e, const orbis::camera::rgbd_frame& frame) {
+  void add(const entry& e, const orbis::image<std::uint16_t>& depth, const orbis::image<orbis::rgb8>& color) {
     entries_.push_back(e);
-    depths_->put(e.index, frame.depth);
-    colors_.put(e.index, frame.color);
+    depths_->put(e.index, depth);
+    colors_.put(e.index, color);
   }
   /// Returns the images of entry `number`, from the background thread if it was started for this entry.
   [[nodiscard]] std::shared_ptr<unpacked> unpack(std::size_t number) const {
@@ -176,22 +175,31 @@ class posed_frames {
       images = ahead_.get();
       if (ahead_number_ != number) images.reset();
     }
-    if (!images) images = read(number);
+    if (!images) images = read(number, free_images());
     note_error(*images);
-    if (background_ && number + 1 != entries_.size()) {
+    if (number + 1 == entries_.size()) {
+      spare_.clear();
+    } else if (background_) {
       ahead_number_ = number + 1;
-      ahead_ = thread_->start([this, next = number + 1] { return read(next); });
+      ahead_ = thread_->start([this, next = number + 1, to = free_images()] { return read(next, to); });
     }
     return images;
   }
-  [[nodiscard]] std::shared_ptr<unpacked> read(std::size_t number) const {
-    auto images = std::make_shared<unpacked>();
-    const std::size_t index = entries_[number].index;
-    if (auto done = depths_->get_whole(index, images->depth); !done) {
-      images->error = done.error();
-      images->depth = orbis::image<std::uint16_t>(source_->camera.model.width(), source_->camera.model.height());
+  /// Returns images that no value owns any more, or new ones. A value must be released on the thread that iterates:
+  /// `use_count` does not synchronise with other threads.
+  [[nodiscard]] std::shared_ptr<unpacked> free_images() const {
+    const auto unused =
+        std::find_if(spare_.begin(), spare_.end(), [](const auto& images) { return images.use_count() == 1; });
+    return unused != spare_.end() ? *unused : spare_.emplace_back(std::make_shared<unpacked>());
+  }
+  [[nodiscard]] std::shared_ptr<unpacked> read(std::size_t number, const std::shared_ptr<unpacked>& to) const {
+    to->color.reset();  // few frames need their colours at the same time
+    to->error.reset();
+    if (auto done = depths_->get_whole(entries_[number].index, to->depth); !done) {
+      to->error = done.error();
+      to->depth = orbis::image<std::uint16_t>(source_->camera.model.width(), source_->camera.model.height());
     }
-    return images;
+    return to;
   }
   void read_color(const entry& e, unpacked& images) const {
     images.color.emplace(source_->camera.model.width(), source_->camera.model.height());
@@ -213,6 +221,7 @@ class posed_frames {
   std::unique_ptr<keyframe_depths> depths_;
   color_file colors_;
   mutable std::optional<orbis::error> read_error_;
+  mutable std::vector<std::shared_ptr<unpacked>> spare_;  // images in use, and images to reuse
   mutable std::size_t ahead_number_ = 0;
   mutable std::future<std::shared_ptr<unpacked>> ahead_;
   std::unique_ptr<background_thread> thread_ = std::make_unique<background_thread>();  // uses the other members

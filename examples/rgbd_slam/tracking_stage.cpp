@@ -83,17 +83,17 @@ class camera_pace {
 
 /// Forwards a tracked frame to the live map.
 void forward_to_live_map(const slam_system& slam, const orbis::slam::track_result& found, std::size_t i,
-                         const orbis::camera::rgbd_frame& frame, const settings& s, live_mapping& live) {
+                         const orbis::image<std::uint16_t>& depth, const settings& s, live_mapping& live) {
   live.tracked(i);
   if (!found.T_world_camera) return;
-  if (found.keyframe) return live.add(i, {found.map, *found.keyframe}, *found.T_world_camera, frame);
+  if (found.keyframe) return live.add(i, {found.map, *found.keyframe}, *found.T_world_camera, depth);
   if (!s.map_every_frame) return;
   const auto tracked = slam.last_frame();
   const auto reference = slam.inspect([&](const orbis::slam::atlas& maps) {
     const auto now = maps.current(tracked->reference);
     return live.find([&](const live_mapping::made& k) { return maps.current(k.keyframe) == now; });
   });
-  if (reference) live.add_frame(i, *reference, tracked->T_reference_camera, frame);
+  if (reference) live.add_frame(i, *reference, tracked->T_reference_camera, depth);
 }
 
 orbis::slam::track_result track_frame(slam_system& slam, const frame_source& source, const source_frame& f) {
@@ -157,12 +157,12 @@ void track_frames(slam_system& slam, const frame_source& source, const settings&
     if (is_mapped) source.complete(*frame);
     const orbis::slam::frame_motion motion{found.shutter, found.twist};
     const orbis::camera::rgbd_frame& at_once = is_mapped ? correct(*frame, motion) : *frame;
-    const orbis::camera::rgbd_frame& for_map =
-        is_mapped ? smooth(remove_moving(at_once, slam.last_frame()), motion) : at_once;
+    const orbis::image<std::uint16_t>& depth =
+        is_mapped ? smooth(remove_moving(at_once, slam.last_frame()), motion) : at_once.depth;
     if (has_keyframe)
       out.keyframes.add(i, {found.map, *found.keyframe}, &at_once == &*frame ? orbis::slam::frame_motion{} : motion,
-                        for_map);
-    if (out.live) forward_to_live_map(slam, found, i, for_map, s, *out.live);
+                        depth, at_once.color);
+    if (out.live) forward_to_live_map(slam, found, i, depth, s, *out.live);
     viewer.show([&] { return make_viewer_frame(slam, i, found, took(), *std::move(frame)); });
     out.slam.tracking_ms.push_back(took());
     viewer.report_error(console);
