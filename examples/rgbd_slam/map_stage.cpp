@@ -76,7 +76,6 @@ orbis::mapping::dense_options dense_options(const frame_source& source, const se
   // Finer than the octree's voxels, so that the octree contains every surface; memory is proportional to the visible
   // surface, not to the duration.
   options.voxel_size = s.resolution / 5;
-  options.flying_pixels.emplace();
   return options;
 }
 
