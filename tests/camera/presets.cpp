@@ -32,6 +32,12 @@ TEST_CASE("presets have the published numbers") {
   CHECK(preset("kinect").value().model == any_camera{pinhole{640, 480, 525.0, 525.0, 319.5, 239.5}});
 }
 
+TEST_CASE("only the camera of freiburg1 has a typical shutter") {
+  for (const std::string_view name : preset_names)
+    CHECK(typical_shutter(preset(name).value().model).has_value() == (name == "tum_fr1"));
+  CHECK(!typical_shutter(pinhole{640, 480, 517.3, 516.5, 318.6, 255.3}));
+}
+
 TEST_CASE("a name that is no preset is answered with those that are") {
   for (const std::string_view name : {"", "tum_fr4", "ICL"}) {
     const auto r = preset(name);
