@@ -7,6 +7,8 @@
 #include <optional>
 #include <string>
 
+#include <orbis/camera/presets.hpp>
+#include <orbis/slam/shutter_estimate.hpp>
 #include <orbis/slam/system.hpp>
 
 #include "interrupts.hpp"
@@ -20,6 +22,21 @@ std::string milliseconds(double seconds, const char* format = "%.1f") {
   char buffer[40];
   std::snprintf(buffer, sizeof buffer, format, 1000.0 * seconds);
   return buffer;
+}
+
+/// The typical shutter of the camera as an estimate, which tracking can revise. Empty if it is unknown, or if the depth
+/// images have no time stamps of their own.
+std::optional<orbis::slam::shutter_estimate> typical_estimate(const frame_source& source) {
+  const auto typical = orbis::camera::typical_shutter(source.camera.model);
+  if (!typical) return std::nullopt;
+  const auto first = source.frame(0);
+  if (!first || !first->depth_timestamp) return std::nullopt;
+  return orbis::slam::shutter_estimate{.shutter = *typical,
+                                       .read_out = typical->color_read_out,
+                                       .read_out_deviation = 0.002,
+                                       .delay = typical->depth_delay,
+                                       .delay_deviation = 0.003,
+                                       .observed = 20.0};  // seconds; estimates are then as accurate
 }
 
 }  // namespace
@@ -42,6 +59,12 @@ shutter_results find_shutter(const frame_source& source, const settings& s, doub
   result.from = "estimated";
   if (source.is_live) return result;
   console.stage("shutter");
+  if (const auto typical = typical_estimate(source)) {
+    result.estimate = *typical;
+    result.shutter = typical->shutter;
+    console.finish(describe(result) + ", typical of this camera");
+    return result;
+  }
   orbis::slam::options options = slam_options(source.camera.model, source.camera.baseline);
   set_profile(s.profile, options);
   options.estimates_shutter = true;

@@ -80,6 +80,14 @@ foreach(out rolling_out found_again)
   check(camera MATCHES "\nread_out_ms = [12]")
 endforeach()
 
+# The shutter of a known camera is not estimated from the first seconds: too short a time, in which it is wrong.
+if(EXISTS ${DATA}/fr1_desk_9)
+  app(0 run ${DATA}/fr1_desk_9 --deterministic --filter none --resolution 0.1 --out desk)
+  check(err MATCHES "\nshutter +rolling, read-out time 20.0 .- 2.0 ms, depth image 13.0 .- 3.0 ms before colour, typical")
+  summary(ate ${WORK}/desk ate_rmse_m)
+  check(ate LESS 0.003)  # 0.005 with a global shutter
+endif()
+
 # Distortion that the camera file does not model is not mistaken for another focal length.
 make_recording(${WORK}/bent 120 320 - 0.15)
 app(0 run bent --deterministic --filter none --resolution 0.1 --out bent_out)
