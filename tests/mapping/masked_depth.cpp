@@ -21,9 +21,9 @@ struct plane {
 
 }  // namespace
 
-static_assert(std::is_same_v<mapping::depth_pixel<camera::depth_view<std::uint16_t>>, std::uint16_t>);
-static_assert(std::is_same_v<mapping::depth_pixel<camera::depth_view<float>>, float>);
-static_assert(camera::depth_source<plane> && std::is_same_v<mapping::depth_pixel<plane>, float>);
+static_assert(std::is_same_v<camera::depth_pixel<camera::depth_view<std::uint16_t>>, std::uint16_t>);
+static_assert(std::is_same_v<camera::depth_pixel<camera::depth_view<float>>, float>);
+static_assert(camera::depth_source<plane> && std::is_same_v<camera::depth_pixel<plane>, float>);
 
 TEST_CASE("a masked image has the stored values of its original, with the same meaning") {
   image<std::uint16_t> stored(4, 3, 2500);

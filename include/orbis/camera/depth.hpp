@@ -71,4 +71,24 @@ depth_view(image_view<T>, Range...) -> depth_view<std::remove_const_t<T>>;
 template <class T, class... Range>
 depth_view(const image<T>&, Range...) -> depth_view<T>;
 
+/// True if `D` is a `depth_view`.
+template <class D>
+inline constexpr bool is_depth_view = false;
+template <class T>
+inline constexpr bool is_depth_view<depth_view<T>> = true;
+
+namespace detail {
+
+template <class D>
+struct depth_pixel : std::type_identity<float> {};
+template <class T>
+struct depth_pixel<depth_view<T>> : std::type_identity<T> {};
+
+}  // namespace detail
+
+/// The pixel type of a copy of a depth image: for a `depth_view` the type of its stored values, otherwise `float`
+/// (metres).
+template <depth_source D>
+using depth_pixel = typename detail::depth_pixel<D>::type;
+
 }  // namespace orbis::camera

@@ -28,7 +28,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -45,12 +44,6 @@
 namespace orbis::camera {
 
 namespace detail {
-
-/// The type in which depth is stored: the pixel type of a `depth_view`; otherwise `float` (metres).
-template <class Depth>
-struct stored_depth : std::type_identity<float> {};
-template <class T>
-struct stored_depth<depth_view<T>> : std::type_identity<T> {};
 
 /// Inverse of a depth in metres; 0 if there is no depth or its inverse is not finite.
 [[nodiscard]] inline float inverse_depth(float metres) noexcept {
@@ -88,7 +81,7 @@ class shutter_correction {
   /// radians between the frame's time and the time of a row; `out` is then unchanged. O(pixels).
   /// @pre the images have the size of the camera and do not overlap
   template <depth_source Depth, class T>
-  requires std::same_as<T, typename detail::stored_depth<Depth>::type>
+  requires std::same_as<T, depth_pixel<Depth>>
   [[nodiscard]] result<void> depth(const shutter& s, const vec6& twist, const Depth& depth, image_view<T> out) {
     assert(has_size(depth) && has_size(out));
     const int width = camera_.width(), height = camera_.height();

@@ -91,11 +91,6 @@ struct window_pixel {
   return window_pixel{static_cast<int>(static_cast<double>(x) + 0.5), static_cast<int>(static_cast<double>(y) + 0.5)};
 }
 
-template <class Depth>
-inline constexpr bool is_depth_view = false;
-template <class T>
-inline constexpr bool is_depth_view<camera::depth_view<T>> = true;
-
 }  // namespace detail
 
 /// Depth along the optical axis at a (subpixel) position `(x, y)`: the depth of a plane fitted to the valid depths
@@ -186,7 +181,7 @@ template <camera::depth_source Depth>
 /// and outside the image, and for depth that is not a `depth_view`.
 template <camera::depth_source Depth>
 void prefetch_depth(const Depth& depth, float x, float y) {
-  if constexpr (detail::is_depth_view<Depth>) {
+  if constexpr (camera::is_depth_view<Depth>) {
     const auto pixels = depth.pixels();
     const auto centre = detail::window_centre(x, y, pixels.width(), pixels.height());
     if (!centre || centre->y == 0 || centre->y + 1 == pixels.height()) return;

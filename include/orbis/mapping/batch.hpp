@@ -96,7 +96,7 @@ class static_depth {
       return 0;
     }
     if (copy_.width() != depth.width() || copy_.height() != depth.height())
-      copy_ = image<mapping::depth_pixel<Depth>>(depth.width(), depth.height());
+      copy_ = image<camera::depth_pixel<Depth>>(depth.width(), depth.height());
     for (int y = 0; y != depth.height(); ++y)
       for (int x = 0; x != depth.width(); ++x) copy_(x, y) = stored_depth(depth, x, y);
     const std::size_t removed = remove_cells(depth, cells, options, copy_.view());
@@ -105,7 +105,7 @@ class static_depth {
   }
 
  private:
-  image<mapping::depth_pixel<Depth>> copy_;
+  image<camera::depth_pixel<Depth>> copy_;
 };
 
 /// The steps of `build_map`. `into.wants(k, whole)` returns true if `into` needs this keyframe's depth image; `whole`
@@ -156,7 +156,7 @@ template <class Octree, execution_policy Policy, keyframe_range Keyframes, camer
   // Everything that depends on one keyframe is computed in a single pass, because depth images are expensive to obtain.
   using keyframe_type = std::ranges::range_value_t<Keyframes>;
   using depth_type = std::remove_cvref_t<decltype(std::declval<const keyframe_type&>().depth)>;
-  using pixel = mapping::depth_pixel<depth_type>;
+  using pixel = camera::depth_pixel<depth_type>;
   built_map<Octree> map{.octree = Octree{options.resolution}};
   const camera::ray_table rays{camera};
   dense_options of_masked = options.dense;

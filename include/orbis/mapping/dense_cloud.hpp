@@ -227,9 +227,10 @@ class dense_cloud {
     auto out = reader.masked(policy, k.depth, rays_, point_options(options_));
     if (kept.is_everything()) return out;
     const auto whole = out;
-    remove_points(policy,
-                  view_like(k.depth, image_view<const depth_pixel<std::remove_cvref_t<decltype(k.depth)>>>(whole)),
-                  number, kept, out.view());
+    remove_points(
+        policy,
+        view_like(k.depth, image_view<const camera::depth_pixel<std::remove_cvref_t<decltype(k.depth)>>>(whole)),
+        number, kept, out.view());
     return out;
   }
   /// The second half of `masked_depth`: sets pixels of `out`, a copy of the stored values of `depth`, to 0 if they
@@ -237,7 +238,7 @@ class dense_cloud {
   /// its image as returned by `keyframe_points::masked`
   template <execution_policy Policy, camera::depth_source Depth>
   void remove_points(const Policy& policy, const Depth& depth, std::size_t number, const selection& kept,
-                     image_view<depth_pixel<Depth>> out) const {
+                     image_view<camera::depth_pixel<Depth>> out) const {
     assert(contains(number));
     if (kept.is_everything()) return;
     keyframe_point_options points = point_options(options_);

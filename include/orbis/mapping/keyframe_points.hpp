@@ -60,9 +60,10 @@ class keyframe_points {
   /// regardless of the stride: the result of `dense_cloud::masked_depth` before the cloud is filtered. O(pixels). @pre
   /// same as for `read`
   template <execution_policy Policy, camera::depth_source Depth>
-  [[nodiscard]] image<depth_pixel<Depth>> masked(const Policy& policy, const Depth& depth,
-                                                 const camera::ray_table& rays, const keyframe_point_options& options) {
-    image<depth_pixel<Depth>> out(rays.width(), rays.height());
+  [[nodiscard]] image<camera::depth_pixel<Depth>> masked(const Policy& policy, const Depth& depth,
+                                                         const camera::ray_table& rays,
+                                                         const keyframe_point_options& options) {
+    image<camera::depth_pixel<Depth>> out(rays.width(), rays.height());
     static_cast<void>(mask(policy, depth, rays, options, out.view()));
     return out;
   }
@@ -70,14 +71,14 @@ class keyframe_points {
   /// flying-pixel filter examined and removed. @pre `out` has the size of `depth`
   template <execution_policy Policy, camera::depth_source Depth>
   cloud::flying_pixel_count mask(const Policy& policy, const Depth& depth, const camera::ray_table& rays,
-                                 const keyframe_point_options& options, image_view<depth_pixel<Depth>> out) {
+                                 const keyframe_point_options& options, image_view<camera::depth_pixel<Depth>> out) {
     const auto keep = [&](const auto& valid) {
       for_each_index(policy, static_cast<std::size_t>(rays.height()), rows_of_part, [&](std::size_t row) {
         const int y = static_cast<int>(row);
         for (int x = 0; x != rays.width(); ++x) {
           const float z = valid(x, y);
           const bool is_point = is_in_range(z, options) && std::isfinite(squared_norm(rays.at(x, y, z)));
-          out(x, y) = is_point ? stored_depth(depth, x, y) : depth_pixel<Depth>{};
+          out(x, y) = is_point ? stored_depth(depth, x, y) : camera::depth_pixel<Depth>{};
         }
       });
     };

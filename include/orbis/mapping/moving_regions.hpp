@@ -74,7 +74,7 @@ class moving_regions {
   /// Writes the stored values of `depth` to `out`, with 0 in moving regions. Returns the number of removed pixels.
   /// O(pixels). @pre `depth` is the image that `find` was called with; `out` has the same size
   template <camera::depth_source Depth>
-  std::size_t remove(const Depth& depth, image_view<depth_pixel<Depth>> out) const {
+  std::size_t remove(const Depth& depth, image_view<camera::depth_pixel<Depth>> out) const {
     for (int y = 0; y != depth.height(); ++y)
       for (int x = 0; x != depth.width(); ++x) out(x, y) = stored_depth(depth, x, y);
     return detail::remove_cells(depth, removed_, same_surface_, out);

@@ -36,7 +36,7 @@ struct removed_cell {
 /// cells that belong to the same surface. Returns the number of removed pixels. O(cells)
 template <camera::depth_source Depth>
 std::size_t remove_cells(const Depth& depth, const std::vector<removed_cell>& cells,
-                         const moving_filter_options& options, image_view<mapping::depth_pixel<Depth>> pixels) {
+                         const moving_filter_options& options, image_view<camera::depth_pixel<Depth>> pixels) {
   constexpr int edge = cell_grid::edge;
   const int across = (depth.width() + edge - 1) / edge;
   std::size_t removed = 0;
