@@ -117,25 +117,17 @@ class radial_tangential {
     return pixel;
   }
 
-  /// g(s) and its derivative.
-  [[nodiscard]] std::pair<double, double> radial(double s) const noexcept {
-    const double n = 1.0 + s * (d_.k1 + s * (d_.k2 + s * d_.k3));
-    const double dn = d_.k1 + s * (2.0 * d_.k2 + s * 3.0 * d_.k3);
-    const double q = 1.0 + s * (d_.k4 + s * (d_.k5 + s * d_.k6));
-    const double dq = d_.k4 + s * (2.0 * d_.k5 + s * 3.0 * d_.k6);
-    const double g = n / q;
-    return {g, (dn - g * dq) / q};
-  }
-
   /// The ray that distorts to `target` without tangential distortion. If there is none, a ray near the boundary of the
   /// domain.
   [[nodiscard]] vec2 radial_start(const vec2& target) const {
     const double distorted = std::sqrt(target.x() * target.x() + target.y() * target.y());
     if (distorted == 0.0) return target;
     const double end = std::sqrt(domain_);
+    coefficients without_tangential = d_;
+    without_tangential.p1 = without_tangential.p2 = 0.0;
     const auto scaled = [&](double r) {
-      const auto [g, dg] = radial(r * r);
-      return std::pair{r * g, g + 2.0 * r * r * dg};
+      const auto at = detail::distort<true>(without_tangential, r, 0.0);
+      return std::pair{at.x, at.by_xx};
     };
     const double r = detail::invert_growing(scaled, distorted, end).value_or(0.99 * std::min(end, distorted));
     const double scale = r / distorted;

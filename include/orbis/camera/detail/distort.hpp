@@ -3,6 +3,8 @@
 /// The lens distortion of `radial_tangential`.
 #pragma once
 
+#include <orbis/core/simd/dispatch.hpp>
+
 namespace orbis::camera::detail {
 
 /// A point on the plane z = 1 after distortion, and the derivative with respect to the point, a symmetric matrix.
@@ -14,7 +16,7 @@ struct distorted_point {
 
 /// Distorts the point (x, y). `d`: `radial_tangential::coefficients`. `T`: double, or a vector of doubles.
 template <bool Derivative, class T, class Coefficients>
-[[nodiscard, gnu::always_inline]] inline distorted_point<T> distort(const Coefficients& d, const T& x, const T& y) {
+[[nodiscard]] ORBIS_ALWAYS_INLINE distorted_point<T> distort(const Coefficients& d, const T& x, const T& y) {
   const T xx = x * x, yy = y * y, xy = x * y, s = xx + yy;
   const T numerator = 1.0 + s * (d.k1 + s * (d.k2 + s * d.k3));
   const T reciprocal = 1.0 / (1.0 + s * (d.k4 + s * (d.k5 + s * d.k6)));
