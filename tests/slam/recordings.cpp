@@ -400,17 +400,20 @@ TEST_CASE("A shutter that is already known from frames is revised later than a g
   io::synthetic_options o{.frames = 85, .fps = 30.0, .seed = 3, .width = 320, .height = 240, .frames_around = 400};
   o.path.jitter = 3.0;
   const io::synthetic_recording frames{o};
+  // Read-outs: assumed for the last frame, and reported.
   const auto last_shutter = [&](double observed) {
     slam::options settings;
     settings.shutter.color_read_out = settings.shutter.depth_read_out = 0.04;  // it is global
     settings.estimates_shutter = true;
-    settings.earlier_estimate.observed = observed;
+    settings.earlier_estimate = {
+        .shutter = settings.shutter, .read_out = 0.04, .read_out_deviation = 0.1, .observed = observed};
     test::slam_system slam{frames.camera().model, settings};
     slam::track_result found;
     for (std::size_t i = 0; i != frames.size(); ++i) found = slam.track(frames.frame(i).value());
-    return found.shutter.color_read_out;
+    return std::pair{found.shutter.color_read_out, slam.estimated_shutter()->read_out};
   };
-  CHECK(last_shutter(0.0) < 0.02);
-  CHECK(last_shutter(1.6) < 0.02);  // revised after 2.5 s, at least 1.5 * 1.6; the recording takes 2.8 s
-  CHECK(last_shutter(1.9) == 0.04);
+  CHECK(last_shutter(0.0).first < 0.02);
+  CHECK(last_shutter(1.6).first < 0.02);  // revised after 2.5 s, at least 1.5 * 1.6; the recording takes 2.8 s
+  CHECK(last_shutter(1.9).first == 0.04);
+  CHECK(last_shutter(20.0) == std::pair{0.04, 0.04});
 }

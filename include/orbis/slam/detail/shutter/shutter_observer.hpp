@@ -139,8 +139,8 @@ class basic_shutter_observer {
     if (watched_ - looked_ < often) return std::nullopt;
     looked_ = watched_;
     const shutter_estimate now = estimator_.estimate(assumed);
-    // After a change, the first estimates have few measurements.
-    if (!last_ || now.read_out_deviation <= 2.0 * last_->linear.read_out_deviation)
+    // After a change, the first estimates have few measurements; an earlier estimate has more until then.
+    if (!last_ || (watched_ >= decided_ && now.read_out_deviation <= 2.0 * last_->linear.read_out_deviation))
       estimate_ = {now, with_distance(now, assumed)};
     else
       estimate_ = *last_;
