@@ -202,7 +202,7 @@ void add_shutter_option(CLI::App& cmd, settings& s) {
            if (value != "auto") s.read_out_ms = std::strtod(value.c_str(), nullptr);
          },
          "read-out time of the rolling shutter in milliseconds, top row first; 0: global shutter; auto (default): from "
-         "the camera file, or else estimated during the run")
+         "the camera file, or else estimated during the run (beginning with typical values for TUM's freiburg1)")
       ->check(CLI::Validator(
           [check = within(0.0, 200.0, " ms")](std::string& text) {
             const std::string why = text == "auto" ? std::string{} : check(text);

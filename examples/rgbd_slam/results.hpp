@@ -80,9 +80,9 @@ struct world_results {
 
 /// The camera's shutter.
 struct shutter_results {
-  std::string from;  ///< "given", "camera" or "estimated"
+  std::string from;  ///< "given", "camera", "typical" or "estimated"
   orbis::camera::shutter shutter{};
-  orbis::slam::shutter_estimate estimate{};  ///< if estimated
+  orbis::slam::shutter_estimate estimate{};  ///< if typical or estimated
 };
 
 /// The camera intrinsics of the run, pixels.

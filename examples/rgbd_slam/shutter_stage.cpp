@@ -29,14 +29,14 @@ std::string milliseconds(double seconds, const char* format = "%.1f") {
 std::optional<orbis::slam::shutter_estimate> typical_estimate(const frame_source& source) {
   const auto typical = orbis::camera::typical_shutter(source.camera.model);
   if (!typical) return std::nullopt;
-  const auto first = source.frame(0);
+  const auto first = source.frame(0);  // for its time stamps
   if (!first || !first->depth_timestamp) return std::nullopt;
   return orbis::slam::shutter_estimate{.shutter = *typical,
                                        .read_out = typical->color_read_out,
-                                       .read_out_deviation = 0.002,
+                                       .read_out_deviation = 0.002,  // see typical_shutter
                                        .delay = typical->depth_delay,
                                        .delay_deviation = 0.003,
-                                       .observed = 20.0};  // seconds; estimates are then as accurate
+                                       .observed = 20.0};  // seconds; short recordings keep it
 }
 
 }  // namespace
@@ -60,6 +60,7 @@ shutter_results find_shutter(const frame_source& source, const settings& s, doub
   if (source.is_live) return result;
   console.stage("shutter");
   if (const auto typical = typical_estimate(source)) {
+    result.from = "typical";
     result.estimate = *typical;
     result.shutter = typical->shutter;
     console.finish(describe(result) + ", typical of this camera");
@@ -89,12 +90,13 @@ shutter_results find_shutter(const frame_source& source, const settings& s, doub
 
 orbis::camera::camera_settings with_shutter(orbis::camera::camera_settings camera, const shutter_results& shutter) {
   const bool is_estimated = shutter.from == "estimated" && !shutter.shutter.is_global();
-  if (shutter.from == "given" || is_estimated) camera.shutter = shutter.shutter;
+  const bool is_typical = shutter.from == "typical" && !orbis::camera::typical_shutter(camera.model);
+  if (shutter.from == "given" || is_estimated || is_typical) camera.shutter = shutter.shutter;
   return camera;
 }
 
 std::string describe(const shutter_results& r) {
-  const bool estimated = r.from == "estimated";
+  const bool estimated = r.from == "estimated" || r.from == "typical";
   if (r.shutter.is_global())
     return !estimated                                     ? "global"
            : std::isfinite(r.estimate.read_out_deviation) ? "global or nearly global"

@@ -316,7 +316,7 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
   console.stage("tracking");
   orbis::slam::options options = options_for(source, s);
   options.shutter = shutter.shutter;
-  options.estimates_shutter = shutter.from == "estimated";
+  options.estimates_shutter = shutter.from == "estimated" || shutter.from == "typical";
   options.earlier_estimate = shutter.estimate;
   slam_system slam = with_threads(viewer, console, [&] { return slam_system{source.camera.model, options}; });
   if (!s.load_map.empty())
@@ -387,7 +387,10 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
     return out;
   }
   out.slam.shutter = shutter;
-  if (const auto estimate = slam.estimated_shutter()) out.slam.shutter = {shutter.from, estimate->shutter, *estimate};
+  if (const auto estimate = slam.estimated_shutter()) {
+    const bool is_kept = estimate->read_out == shutter.estimate.read_out;
+    out.slam.shutter = {is_kept ? shutter.from : "estimated", estimate->shutter, *estimate};
+  }
   if (out.stopped && out.stopped->code == orbis::errc::exception) out.live.reset();  // frees most of the memory
 
   // The results describe the loaded map if the camera was relocalised in it, otherwise the map with the most frames.

@@ -35,6 +35,7 @@ TEST_CASE("presets have the published numbers") {
 TEST_CASE("only the camera of freiburg1 has a typical shutter") {
   for (const std::string_view name : preset_names)
     CHECK(typical_shutter(preset(name).value().model).has_value() == (name == "tum_fr1"));
+  CHECK(typical_shutter(preset("tum_fr1").value().model) == shutter{0.020, 0.020, -0.013});
   CHECK(!typical_shutter(pinhole{640, 480, 517.3, 516.5, 318.6, 255.3}));
 }
 

@@ -47,15 +47,14 @@ inline constexpr std::array<std::string_view, 5> preset_names{"tum_fr1", "tum_fr
   return fail(errc::invalid_argument, "camera preset", in_quotes(name) + " is not one of " + known);
 }
 
-/// Returns the typical shutter of the Kinect that recorded TUM's freiburg1 sequences if `camera` is that of the preset
-/// `tum_fr1`, and nothing for other cameras. Its standard deviations are about 2 ms (read-out) and 3 ms (delay). It is
-/// valid for images with their own time stamps, whose difference varies in these sequences.
+/// Returns the typical shutter of the Kinect that recorded TUM's freiburg1 sequences if `camera` equals that of the
+/// preset `tum_fr1`, and nothing for other cameras. Its standard deviations are about 2 ms (read-out) and 3 ms (delay).
+/// It requires separate time stamps of colour and depth images, because their difference varies.
 ///
-/// Source: estimates of `slam::options::estimates_shutter` for 220 frames of freiburg1_xyz (20 to 23 ms, -10 to -16 ms)
-/// and the errors of nine frames of freiburg1_desk (least for 15 to 25 ms, -13 to -22 ms).
+/// Source: estimates of `slam::options::estimates_shutter` for 220 frames of freiburg1_xyz, 20 to 23 ms and -10 to
+/// -16 ms. The errors of nine frames of freiburg1_desk are least for 15 to 25 ms and -13 to -22 ms.
 [[nodiscard]] inline std::optional<shutter> typical_shutter(const any_camera& camera) {
-  const auto known = preset("tum_fr1");
-  if (!known || !(camera == known->model)) return std::nullopt;
+  if (camera != preset("tum_fr1").value().model) return std::nullopt;
   return shutter{.color_read_out = 0.020, .depth_read_out = 0.020, .depth_delay = -0.013};
 }
 
