@@ -85,7 +85,7 @@ class shutter_correction {
   [[nodiscard]] result<void> depth(const shutter& s, const vec6& twist, const Depth& depth, image_view<T> out) {
     assert(has_size(depth) && has_size(out));
     const int width = camera_.width(), height = camera_.height();
-    constexpr bool is_view = std::same_as<Depth, depth_view<T>>;
+    constexpr bool is_view = is_depth_view<Depth>;
     double scale = 1.0;
     if constexpr (is_view) scale = depth.scale();
     const auto time = detail::row_time::of_depth(s, height);
