@@ -82,7 +82,10 @@ struct world_results {
 struct shutter_results {
   std::string from;  ///< "given", "camera", "typical" or "estimated"
   orbis::camera::shutter shutter{};
-  orbis::slam::shutter_estimate estimate{};  ///< if typical or estimated
+  orbis::slam::shutter_estimate estimate{};  ///< if it can be revised
+
+  /// True if tracking estimates the shutter and can revise it.
+  [[nodiscard]] bool can_be_revised() const { return from == "typical" || from == "estimated"; }
 };
 
 /// The camera intrinsics of the run, pixels.

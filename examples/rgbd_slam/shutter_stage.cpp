@@ -96,13 +96,12 @@ orbis::camera::camera_settings with_shutter(orbis::camera::camera_settings camer
 }
 
 std::string describe(const shutter_results& r) {
-  const bool estimated = r.from == "estimated" || r.from == "typical";
   if (r.shutter.is_global())
-    return !estimated                                     ? "global"
+    return !r.can_be_revised()                            ? "global"
            : std::isfinite(r.estimate.read_out_deviation) ? "global or nearly global"
                                                           : "assumed global";
   const auto value = [&](double seconds, double deviation) {
-    return milliseconds(seconds) + (estimated ? " +- " + milliseconds(deviation) : "") + " ms";
+    return milliseconds(seconds) + (r.can_be_revised() ? " +- " + milliseconds(deviation) : "") + " ms";
   };
   std::string text = "rolling, read-out time " + value(r.shutter.color_read_out, r.estimate.read_out_deviation);
   if (r.shutter.depth_read_out != r.shutter.color_read_out)

@@ -316,7 +316,7 @@ orbis::result<tracked_frames> track(const frame_source& source, const shutter_re
   console.stage("tracking");
   orbis::slam::options options = options_for(source, s);
   options.shutter = shutter.shutter;
-  options.estimates_shutter = shutter.from == "estimated" || shutter.from == "typical";
+  options.estimates_shutter = shutter.can_be_revised();
   options.earlier_estimate = shutter.estimate;
   slam_system slam = with_threads(viewer, console, [&] { return slam_system{source.camera.model, options}; });
   if (!s.load_map.empty())
