@@ -364,9 +364,13 @@ TEST_CASE("Depth in the pose lowers the error from frame to frame") {
     slam::options settings;
     settings.shutter = {.color_read_out = 0.02, .depth_delay = -0.01};
     settings.depth_term.enabled = settings.depth_term.recovers = depth;
-    test::slam_system slam{recording.camera().model, settings};
-    for (std::size_t i = 0; i != 80; ++i) CHECK(slam.track(recording.frame(i).value()).tracked());
-    return eval::rpe(slam.trajectory(), recording.ground_truth())->translation.rmse;
+    double sum = 0.0;
+    for (const std::size_t first : {0, 55, 110}) {  // the ratio for one part varies between 0.8 and 1.02
+      test::slam_system slam{recording.camera().model, settings};
+      for (std::size_t i = first; i != first + 55; ++i) CHECK(slam.track(recording.frame(i).value()).tracked());
+      sum += eval::rpe(slam.trajectory(), recording.ground_truth())->translation.rmse;
+    }
+    return sum;
   };
   const double with = error(true), without = error(false);
   CAPTURE(with, without);
