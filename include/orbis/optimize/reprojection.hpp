@@ -148,7 +148,8 @@ struct reprojection {
 
   // Evaluation of eight observations at a time; see detail/bundle/lane_residual.hpp.
   static constexpr int measured = 6;
-  static void measure(const observation& o, double* to) {
+  template <observed_pixel Observation = observation>
+  static void measure(const Observation& o, double* to) {
     to[0] = o.pixel.x();
     to[8] = o.pixel.y();
     to[16] = o.has_depth() ? o.right : 0.0;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <cmath>
 #include <cstddef>
-#include <span>
 #include <vector>
 
 #include <orbis/camera/pinhole.hpp>
@@ -48,38 +47,20 @@ std::vector<row_observation> observations_of(std::size_t n, double sigma) {
   return all;
 }
 
-}  // namespace
-
-TEST_CASE("The Jacobian of a row's residual by pose and twist is that of finite differences") {
-  const se3 T_camera_world = pose.inverse();
-  for (row_observation& o : observations_of(20, 0.0)) {
-    matrix<3, 6> j;
-    REQUIRE(row_residual(model, T_camera_world, motion, o, j));
-    matrix<3, 6> unused;
-    constexpr double h = 1e-6;
-    for (int k = 0; k != 6; ++k) {
-      vec6 step = vec6::Zero();
-      step[k] = h;
-      const vec3 by_pose = (*row_residual(model, se3::exp(step) * T_camera_world, motion, o, unused) -
-                            *row_residual(model, se3::exp(-step) * T_camera_world, motion, o, unused)) /
-                           (2.0 * h);
-      const vec3 by_twist = (*row_residual(model, T_camera_world, motion + step, o, unused) -
-                             *row_residual(model, T_camera_world, motion - step, o, unused)) /
-                            (2.0 * h);
-      // The camera frame turns by a hundredth of a radian between the frame's time and the row's.
-      const double scale = 0.03 * j.norm();
-      CHECK((by_pose - j.col(k)).norm() < scale);
-      CHECK((by_twist + o.time * j.col(k)).norm() < 0.015 * scale);
-    }
-  }
+row_lanes in_lanes(const std::vector<row_observation>& observations) {
+  row_lanes lanes;
+  for (const row_observation& o : observations) lanes.add(o, model);
+  return lanes;
 }
+
+}  // namespace
 
 TEST_CASE("Pose and twist are found from one image, and its twist is what the rows tell") {
   const auto seen = observations_of(300, 0.0);
   const moving_pose start{pose * se3::exp(vector6(0.01, -0.02, 0.01, 0.01, 0.02, -0.01)), vec6::Zero()};
   twist_prior weak;
   weak.translation_deviation = weak.rotation_deviation = 100.0;
-  const moving_pose found = refine_moving_pose(std::span<const row_observation>(seen), model, start, weak, 20);
+  const moving_pose found = refine_moving_pose(in_lanes(seen), model, start, weak, 20);
   CHECK((found.T_world_camera.inverse() * pose).log().norm() < 1e-5);
   CHECK((found.twist - motion).norm() < 1e-3);
 }
@@ -89,12 +70,12 @@ TEST_CASE("With noise the prior holds the twist, and the pose is better than wit
   const se3 before = pose * se3::exp(-0.033 * motion);
   const twist_prior prior = twist_prior::after({before, motion}, 0.033, true);
   const moving_pose start{pose * se3::exp(vector6(0.01, -0.02, 0.01, 0.01, 0.02, -0.01)), motion};
-  const moving_pose found = refine_moving_pose(std::span<const row_observation>(seen), model, start, prior);
+  const moving_pose found = refine_moving_pose(in_lanes(seen), model, start, prior);
   CHECK((found.T_world_camera.inverse() * pose).log().norm() < 0.003);
   CHECK((found.twist - motion).norm() < 0.1);
   auto at_once = seen;
   for (row_observation& o : at_once) o.time = 0.0;
-  const moving_pose rigid = refine_moving_pose(std::span<const row_observation>(at_once), model, start, prior);
+  const moving_pose rigid = refine_moving_pose(in_lanes(at_once), model, start, prior);
   CHECK((rigid.T_world_camera.inverse() * pose).log().norm() >
         3.0 * (found.T_world_camera.inverse() * pose).log().norm());
 }
@@ -117,42 +98,34 @@ TEST_CASE("Gradient and prior of the normal equations are those of their cost") 
   const auto seen = observations_of(60, 0.5);
   const twist_prior prior = twist_prior::after({pose * se3::exp(-0.033 * motion), 0.8 * motion}, 0.033, true);
   const se3 T_camera_world = (pose * se3::exp(vector6(0.002, 0.001, -0.001, 0.001, 0.001, 0.001))).inverse();
-  const auto at = linearize(std::span<const row_observation>(seen), model, T_camera_world, motion, prior);
+  const auto at = linearize(in_lanes(seen), model, T_camera_world, motion, prior);
   for (int k = 0; k != 12; ++k) {
     constexpr double h = 1e-6;
     const auto cost = [&](double by) {
       vec6 step = vec6::Zero(), turn = vec6::Zero();
       (k < 6 ? step[k] : turn[k - 6]) = by;
-      return linearize(std::span<const row_observation>(seen), model, se3::exp(step) * T_camera_world, motion + turn,
-                       prior)
-          .cost;
+      return linearize(in_lanes(seen), model, se3::exp(step) * T_camera_world, motion + turn, prior).cost;
     };
     const double slope = (cost(h) - cost(-h)) / (2.0 * h);
     CHECK(std::abs(slope - at.g[k]) < 0.03 * (k < 6 ? at.g.head<6>().norm() : at.g.tail<6>().norm()));
   }
-  const auto without_derivatives =
-      linearize<false>(std::span<const row_observation>(seen), model, T_camera_world, motion, prior);
-  CHECK(without_derivatives.cost == Approx(at.cost).epsilon(1e-12));
 }
 
-TEST_CASE("The normal equations of pose and twist are the sum of the products of the derivatives") {
-  const auto seen = observations_of(60, 0.5);
+TEST_CASE("The normal equations of pose and twist are those of the rows and of the prior") {
+  const row_lanes seen = in_lanes(observations_of(60, 0.5));
   const twist_prior prior = twist_prior::after({pose * se3::exp(-0.033 * motion), 0.8 * motion}, 0.033, true);
   const se3 T_camera_world = pose.inverse();
-  // With a prior, and with no other observations, the equations are those of the prior.
-  Eigen::Matrix<double, 12, 12> sum =
-      linearize(std::span<const row_observation>(), model, T_camera_world, motion, prior).h;
-  for (const row_observation& o : seen) {
-    matrix<3, 6> by_pose;
-    const auto r = row_residual(model, T_camera_world, motion, o, by_pose);
-    REQUIRE(r);
-    Eigen::Matrix<double, 3, 12> j;
-    j << by_pose, -o.time * by_pose;
-    const double error = std::sqrt(r->squaredNorm() * o.seen.information);
-    sum += o.seen.information * std::min(1.0, slam::detail::row_loss_width / error) * j.transpose() * j;
-  }
-  const auto at = linearize(std::span<const row_observation>(seen), model, T_camera_world, motion, prior);
-  CHECK((at.h - sum).norm() < 1e-9 * sum.norm());
+  const row_sums rows = sum_rows(seen, model, T_camera_world, motion);
+  const auto of_prior = linearize(row_lanes{}, model, T_camera_world, motion, prior);
+  const auto all = linearize(seen, model, T_camera_world, motion, prior);
+  Eigen::Matrix<double, 12, 12> h;
+  h << rows.matrix(0), rows.matrix(1), rows.matrix(1), rows.matrix(2);
+  Eigen::Matrix<double, 12, 1> g;
+  g << rows.gradient(0), rows.gradient(1);
+  CHECK((all.h - of_prior.h - h).norm() <= 1e-12 * h.norm());
+  CHECK((all.g - of_prior.g - g).norm() <= 1e-12 * g.norm());
+  CHECK(all.cost == Approx(of_prior.cost + rows.cost));
+  CHECK(of_prior.h(6, 6) == Approx(1.0 / (prior.translation_deviation * prior.translation_deviation)));
 }
 
 TEST_CASE("Early depth follows the refined twist as far as pixels determine it, and the former twist otherwise") {
@@ -162,10 +135,10 @@ TEST_CASE("Early depth follows the refined twist as far as pixels determine it, 
     const vec6 former = motion + off;
     const twist_prior prior = twist_prior::after({before, former}, 0.033, true);
     early_depth_twist twist;
-    twist.update(std::span<const row_observation>(seen), model, {before, former}, {});
+    twist.update(in_lanes(seen), model, {before, former}, {});
     CHECK(twist.between({}, motion) == motion);  // no former frame
     twist.advance();
-    twist.update(std::span<const row_observation>(seen), model, {pose, motion}, prior);
+    twist.update(in_lanes(seen), model, {pose, motion}, prior);
     return (former - twist.between(prior, motion)).dot(off) / off.squaredNorm();
   };
   const vec6 sideways_or_turning = vector6(0.2, 0.0, 0.0, 0.0, -0.1, 0.0), rolling = vector6(0, 0, 0, 0, 0, 0.2);

@@ -5,12 +5,8 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <optional>
-#include <span>
-#include <type_traits>
-#include <vector>
 
 #include <orbis/camera/model.hpp>
 #include <orbis/camera/shutter.hpp>
@@ -20,7 +16,7 @@
 #include <orbis/optimize/reprojection.hpp>
 #include <orbis/slam/camera_rig.hpp>
 #include <orbis/slam/detail/map/point_observation.hpp>
-#include <orbis/slam/detail/shutter/motion_sums.hpp>
+#include <orbis/slam/detail/shutter/row_equations.hpp>
 #include <orbis/slam/detail/shutter/row_times.hpp>
 #include <orbis/slam/frame.hpp>
 #include <orbis/slam/map.hpp>
@@ -66,12 +62,6 @@ struct twist_prior {
   }
 };
 
-/// A keypoint as read, and the known point that it observes.
-struct row_observation {
-  optimize::pose_observation seen;
-  double time = 0.0;  ///< time of the keypoint's row relative to the frame, seconds
-};
-
 /// Returns the mean twist of the camera from one frame to a later one; zero if the second frame is not later.
 template <feature_descriptor D>
 [[nodiscard]] vec6 motion_between(const basic_frame<D>& before, const basic_frame<D>& after) {
@@ -84,23 +74,24 @@ template <feature_descriptor D>
 /// O(features).
 template <feature_descriptor D, camera::camera_model Camera>
 void find_row_observations(const basic_frame<D>& f, const basic_map<D>& m, const camera_rig<Camera>& rig,
-                           std::vector<row_observation>& to) {
+                           row_lanes& to) {
   to.clear();
   for (std::size_t i = 0; i != f.size(); ++i) {
     if (f.landmarks[i] == no_id) continue;
     const vec3& position = m.landmark_at(f.landmarks[i]).position;
-    row_observation& o = to.emplace_back();
     if (f.as_read.empty()) {
-      o.seen = landmark_observation(rig, f, i, position);
+      to.add({landmark_observation(rig, f, i, position)}, rig.model);
       continue;
     }
     const keypoint_as_read& read = f.as_read[i];
+    row_observation o;
     o.seen.point = position;
     o.seen.pixel = {static_cast<double>(read.x), static_cast<double>(read.y)};
     if (read.depth > 0.0F) o.seen.right = rig.model.right(o.seen.pixel.x(), static_cast<double>(read.depth));
     o.seen.information = rig.scales.information(f.features.keypoints[i].octave);
     set_spread(o.seen, f.spread(i));
     o.time = f.shutter.color_time(o.seen.pixel.y(), rig.camera().height());
+    to.add(o, rig.model);
   }
 }
 
@@ -108,36 +99,6 @@ void find_row_observations(const basic_frame<D>& f, const basic_map<D>& m, const
 template <feature_descriptor D>
 [[nodiscard]] double landmark_depth(const basic_frame<D>& f, std::size_t i, const basic_map<D>& m) {
   return f.landmarks[i] == no_id ? 0.0 : (f.T_world_camera.inverse() * m.landmark_at(f.landmarks[i]).position).z();
-}
-
-/// Width of the Huber loss for these residuals, in standard deviations: as in pose-only refinement.
-inline constexpr double row_loss_width = 2.447;
-
-/// Returns the residual of an observation, the observed point `q` in the camera frame at the time of its row and, if
-/// `WithDerivative`, the derivative with respect to this point; otherwise `by_point` is unchanged. Empty if the point
-/// has no projection.
-template <bool WithDerivative, camera::camera_model Camera>
-[[nodiscard]] std::optional<vec3> row_residual(const optimize::reprojection<Camera>& model, const se3& T_camera_world,
-                                               const vec6& twist, const row_observation& o, vec3& q, mat3& by_point) {
-  q = moved_by(twist, -o.time, T_camera_world * o.seen.point);
-  if constexpr (WithDerivative)
-    return model.residual(q, o.seen, by_point);
-  else
-    return model.residual(q, o.seen);
-}
-
-/// Returns the residual of an observation, and its derivative with respect to a motion of the camera frame (`exp(step)
-/// * T_camera_world`) at the time of its row; the derivative with respect to the twist is `-o.time` times that
-/// derivative. Empty if the point has no projection.
-template <camera::camera_model Camera>
-[[nodiscard]] std::optional<vec3> row_residual(const optimize::reprojection<Camera>& model, const se3& T_camera_world,
-                                               const vec6& twist, const row_observation& o, matrix<3, 6>& j) {
-  vec3 q;
-  mat3 by_point;
-  const auto r = row_residual<true>(model, T_camera_world, twist, o, q, by_point);
-  if (!r) return std::nullopt;
-  j = side_by_side(by_point, -by_point * hat<double>(q));
-  return r;
 }
 
 /// A cost of measurements other than keypoints, as a quadratic function of pose and twist around `at`. A step consists
@@ -219,38 +180,17 @@ inline void add_terms(moving_pose_equations& e, const std::array<mat6, 3>& h, co
   return stacked(pose.value_or(zeros<vec6>()), zeros<vec6>());
 }
 
-/// Returns the normal equations of pose and twist at a pose. If `WithDerivatives` is false, only their cost is
-/// computed.
-template <bool WithDerivatives = true, camera::camera_model Camera>
-[[nodiscard]] moving_pose_equations linearize(std::span<const row_observation> observations,
+/// Returns the normal equations of pose and twist at a pose. O(observations).
+template <camera::camera_model Camera>
+[[nodiscard]] moving_pose_equations linearize(const row_lanes& observations,
                                               const optimize::reprojection<Camera>& model, const se3& T_camera_world,
                                               const vec6& twist, const twist_prior& prior,
                                               const refinement_terms& terms = {}) {
-  constexpr double width = row_loss_width;
+  const row_sums sums = sum_rows(observations, model, T_camera_world, twist);
   moving_pose_equations e;
-  std::array<motion_sums, 3> sums;  // times 1, the negated time, and its square
-  std::array<vec6, 2> g{zeros<vec6>(), zeros<vec6>()};
-  for (const row_observation& o : observations) {
-    vec3 q;
-    mat3 by_point;
-    const auto r = row_residual<WithDerivatives>(model, T_camera_world, twist, o, q, by_point);
-    if (!r) continue;
-    const double error = std::sqrt(squared_norm(*r) * o.seen.information);
-    const double weight = o.seen.information * (error <= width ? 1.0 : width / error);
-    e.cost += error <= width ? 0.5 * error * error : width * (error - 0.5 * width);
-    if constexpr (WithDerivatives) {
-      const mat3 weighted = weight * transposed(by_point);
-      motion_sums added = motion_sums::of_point(weighted * by_point, q);
-      for (motion_sums& sum : sums) {
-        sum += added;
-        added *= -o.time;
-      }
-      const vec6 slope = by_motion(weighted * *r, q);
-      g[0] += slope, g[1] -= o.time * slope;
-    }
-  }
-  const std::array<mat6, 3> h{sums[0].matrix(), sums[1].matrix(), sums[2].matrix()};
-  add_terms(e, h, g, T_camera_world, twist, prior, terms);
+  e.cost = sums.cost;
+  add_terms(e, {sums.matrix(0), sums.matrix(1), sums.matrix(2)}, {sums.gradient(0), sums.gradient(1)}, T_camera_world,
+            twist, prior, terms);
   return e;
 }
 
@@ -272,23 +212,12 @@ class early_depth_twist {
  public:
   /// Computes the gain from the pixels of a frame's observations. Must be called before `between`. O(observations).
   template <camera::camera_model Camera>
-  void update(std::span<const row_observation> observations, const optimize::reprojection<Camera>& model,
-              const moving_pose& at, const twist_prior& prior) {
-    constexpr double width = row_loss_width;
+  void update(const row_lanes& observations, const optimize::reprojection<Camera>& model, const moving_pose& at,
+              const twist_prior& prior) {
     constexpr double share = 0.25;  // share of the information: errors of nearby landmarks are correlated
-    const se3 T_camera_world = at.T_world_camera.inverse();
-    std::array<mat6, 3> h{identity<mat6>(), zeros<mat6>(), zeros<mat6>()};  // a metre or a radian, without observations
-    for (const row_observation& o : observations) {
-      matrix<3, 6> j;
-      const auto r = row_residual(model, T_camera_world, at.twist, o, j);
-      if (!r) continue;
-      const matrix<2, 6> by_pixel = block<2, 6>(j, 0, 0);
-      const double error = std::sqrt(squared_norm(head<2>(*r)) * o.seen.information);
-      const double weight = share * o.seen.information * (error <= width ? 1.0 : width / error);
-      const mat6 a = weight * transposed(by_pixel) * by_pixel;
-      h[0] += a, h[1] -= o.time * a, h[2] += o.time * o.time * a;
-    }
-    determine(h, prior);
+    const row_sums sums = sum_rows(observations, model, at.T_world_camera.inverse(), at.twist, false);
+    // Without observations, the standard deviations are a metre and a radian.
+    determine({identity<mat6>() + share * sums.matrix(0), share * sums.matrix(1), share * sums.matrix(2)}, prior);
   }
 
   /// Returns a twist between those of the previous and the current frame.
@@ -320,11 +249,13 @@ class early_depth_twist {
   mat6 gain_ = identity<mat6>();
 };
 
-/// As `refine_moving_pose`, for a camera whose model is known at compile time.
+/// Refines pose and twist, or only the pose, by Gauss-Newton steps as long as they reduce the cost. The observations
+/// should contain few outliers. O(observations) per step.
 template <camera::camera_model Camera>
-[[nodiscard]] moving_pose refine_with_model(std::span<const row_observation> observations,
-                                            const optimize::reprojection<Camera>& model, const moving_pose& start,
-                                            const twist_prior& prior, int iterations, const refinement_terms& terms) {
+[[nodiscard]] moving_pose refine_moving_pose(const row_lanes& observations, const optimize::reprojection<Camera>& model,
+                                             const moving_pose& start, const twist_prior& prior, int iterations = 5,
+                                             const refinement_terms& terms = {}) {
+  constexpr double least_gain = 1e-5;  // fraction of the cost
   se3 T_camera_world = start.T_world_camera.inverse();
   vec6 twist = start.twist;
   moving_pose_equations now = linearize(observations, model, T_camera_world, twist, prior, terms);
@@ -333,32 +264,14 @@ template <camera::camera_model Camera>
     if (!all_finite(step)) break;
     const se3 there = se3::exp(head<6>(step)) * T_camera_world;
     const vec6 moving = twist + tail<6>(step);
-    const auto linearized = [&](auto with_derivatives) {
-      return linearize<with_derivatives()>(observations, model, there, moving, prior, terms);
-    };
-    // The last step needs no derivatives. It is expected to be the last if its predicted gain is below the threshold.
-    constexpr double least_gain = 1e-5;  // fraction of the cost
-    const bool is_last = k + 1 == iterations || -0.5 * dot(step, now.g) < least_gain * now.cost;
-    const moving_pose_equations then = is_last ? linearized(std::false_type{}) : linearized(std::true_type{});
+    const moving_pose_equations then = linearize(observations, model, there, moving, prior, terms);
     if (!(then.cost < now.cost)) break;
     T_camera_world = there;
     twist = moving;
-    if (k + 1 == iterations || now.cost - then.cost < least_gain * then.cost) break;
-    now = is_last ? linearized(std::true_type{}) : then;
+    if (now.cost - then.cost < least_gain * then.cost) break;
+    now = then;
   }
   return {T_camera_world.inverse(), twist};
-}
-
-/// Refines pose and twist, or only the pose, by Gauss-Newton steps as long as they reduce the cost. The observations
-/// should contain few outliers. O(observations) per step.
-template <camera::camera_model Camera>
-[[nodiscard]] moving_pose refine_moving_pose(std::span<const row_observation> observations,
-                                             const optimize::reprojection<Camera>& model, const moving_pose& start,
-                                             const twist_prior& prior, int iterations = 5,
-                                             const refinement_terms& terms = {}) {
-  return camera::with_model(model.camera, [&](const auto& camera) {
-    return refine_with_model(observations, optimize::reprojection{camera, model.bf}, start, prior, iterations, terms);
-  });
 }
 
 }  // namespace orbis::slam::detail

@@ -6,7 +6,6 @@
 #include <cassert>
 #include <cstddef>
 #include <optional>
-#include <span>
 #include <utility>
 #include <vector>
 
@@ -87,11 +86,10 @@ class frame_refinement {
         find_row_observations(f, m, c_.rig, rows_);
       }
       if (with_depth) c_.depth_quadratic = c_.depth.term_at(refined, f.shutter);
-      refined =
-          refine_moving_pose(std::span<const row_observation>(rows_), c_.rig.model, refined, prior, with_depth ? 3 : 5,
-                             {.other = c_.depth_quadratic ? &*c_.depth_quadratic : nullptr, .moves = rolls});
+      refined = refine_moving_pose(rows_, c_.rig.model, refined, prior, with_depth ? 3 : 5,
+                                   {.other = c_.depth_quadratic ? &*c_.depth_quadratic : nullptr, .moves = rolls});
       if (f.shutter.is_depth_early()) {
-        early_depth_.update(std::span<const row_observation>(rows_), c_.rig.model, refined, prior);
+        early_depth_.update(rows_, c_.rig.model, refined, prior);
         refined.twist = early_depth_.between(prior, refined.twist);
       }
     }
@@ -133,7 +131,7 @@ class frame_refinement {
 
   Context& c_;
   early_depth_twist early_depth_;
-  std::vector<row_observation> rows_;       ///< reused working memory
+  row_lanes rows_;                          ///< reused working memory
   std::vector<keypoint_as_read> observed_;  ///< reused working memory
 };
 

@@ -122,7 +122,7 @@ class young_frames {
     const bool moves = motion && !f.shutter.is_global();
     find_row_observations(f, m, rig_, rows_);
     return refine_moving_pose(
-               std::span<const row_observation>(rows_), rig_.model, {f.T_world_camera, f.twist},
+               rows_, rig_.model, {f.T_world_camera, f.twist},
                {.twist_before = f.twist, .translation_deviation = deviation, .rotation_deviation = deviation}, 5,
                {.other = young.depth ? &*young.depth : nullptr, .moves = moves})
         .T_world_camera;
@@ -137,8 +137,8 @@ class young_frames {
   map_id map_ = no_id;        ///< the last map that was started
   std::size_t count_ = most;  ///< number of frames of that map so far
   std::size_t keyframes_ = 0;
-  features::image_pyramid pyramid_;    ///< reused working memory
-  std::vector<row_observation> rows_;  ///< reused working memory
+  features::image_pyramid pyramid_;  ///< reused working memory
+  row_lanes rows_;                   ///< reused working memory
 };
 
 }  // namespace orbis::slam::detail
