@@ -14,9 +14,9 @@
 #pragma once
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -41,7 +41,7 @@ struct row_view {
   camera::shutter shutter{};
   vec6 twist = zeros<vec6>();
   std::vector<keypoint_as_read> read;
-  std::vector<landmark_id> landmarks;  ///< landmark of each keypoint
+  std::vector<landmark_id> landmarks;  ///< landmark of each keypoint, in ascending order
   std::vector<double> information;     ///< for each keypoint: 1 / variance of the pixel
 };
 
@@ -94,17 +94,15 @@ struct motion_sums {
 
 /// Returns the equations of the points that two views share; empty if there are too few. `shutter`: the shutter assumed
 /// when `depth` of the keypoints was read; the equations are linearised around it. O(keypoints).
+/// @pre the landmarks of both views are in ascending order
 template <camera::camera_model Camera>
 [[nodiscard]] std::optional<shutter_equations> build_shutter_equations(const row_view& from, const row_view& to,
                                                                        const camera_rig<Camera>& rig,
                                                                        const camera::shutter& shutter) {
+  assert(std::is_sorted(from.landmarks.begin(), from.landmarks.end()) &&
+         std::is_sorted(to.landmarks.begin(), to.landmarks.end()));
   constexpr std::size_t enough = 30;
   constexpr double width = 3.5;  // of the Huber loss: both keypoints have errors
-  std::vector<std::pair<landmark_id, std::uint32_t>> seen;
-  for (std::uint32_t i = 0; i != from.read.size(); ++i)
-    if (from.read[i].depth > 0.0F) seen.emplace_back(from.landmarks[i], i);
-  std::sort(seen.begin(), seen.end());
-
   const int height = rig.camera().height();
   const auto share = [&](float v) {
     return camera::shutter{.color_read_out = 1.0}.color_time(static_cast<double>(v), height);
@@ -119,10 +117,11 @@ template <camera::camera_model Camera>
   shutter_equations e;
   vec2 gradient = zeros<vec2>();
   std::size_t count = 0;
-  for (std::size_t i = 0; i != to.read.size(); ++i) {
-    const auto at = std::lower_bound(seen.begin(), seen.end(), std::pair{to.landmarks[i], std::uint32_t{0}});
-    if (at == seen.end() || at->first != to.landmarks[i]) continue;
-    const keypoint_as_read& a = from.read[at->second];
+  for (std::size_t i = 0, j = 0; i != to.read.size(); ++i) {
+    while (j != from.read.size() && from.landmarks[j] < to.landmarks[i]) ++j;
+    if (j == from.read.size()) break;
+    if (from.landmarks[j] != to.landmarks[i] || !(from.read[j].depth > 0.0F)) continue;
+    const keypoint_as_read& a = from.read[j];
     const keypoint_as_read& b = to.read[i];
     const vec3 ray(a.ray_x, a.ray_y, 1.0);
     const vec3 there = moved_by(from.twist, shutter.color_read_out * share(a.y), static_cast<double>(a.depth) * ray);
@@ -133,7 +132,7 @@ template <camera::camera_model Camera>
     mat3 by_point;
     const auto r = rig.model.residual(q, o, by_point);
     if (!r) continue;
-    const double information = std::min(from.information[at->second], to.information[i]);
+    const double information = std::min(from.information[j], to.information[i]);
     const double error = std::sqrt(squared_norm(*r) * information);
     const double weight = information * (error <= width ? 1.0 : width / error);
     const depth_change change_a = a.change.if_even(a.depth), change_b = b.change.if_even(b.depth);

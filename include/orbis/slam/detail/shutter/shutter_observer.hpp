@@ -90,10 +90,13 @@ class basic_shutter_observer {
     pending_.read.clear();
     pending_.landmarks.clear();
     pending_.information.clear();
-    for (std::size_t i = 0; i != f.size(); ++i) {
-      if (f.landmarks[i] == no_id) continue;
+    by_landmark_.clear();
+    for (std::size_t i = 0; i != f.size(); ++i)
+      if (f.landmarks[i] != no_id) by_landmark_.emplace_back(f.landmarks[i], i);
+    std::sort(by_landmark_.begin(), by_landmark_.end());
+    for (const auto& [landmark, i] : by_landmark_) {
       pending_.read.push_back(f.as_read[i]);
-      pending_.landmarks.push_back(f.landmarks[i]);
+      pending_.landmarks.push_back(landmark);
       pending_.information.push_back(rig.scales.information(f.features.keypoints[i].octave));
     }
     pending_keyframe_ = keyframe;
@@ -175,6 +178,7 @@ class basic_shutter_observer {
   std::optional<judged_estimate> last_;  ///< estimate at the last change of the shutter
   std::vector<std::pair<map_keyframe, row_view>> views_;
   row_view pending_;
+  std::vector<std::pair<landmark_id, std::size_t>> by_landmark_;  ///< reused working memory
   row_reader read_;  ///< reads the depth image of the pending frame
   std::optional<map_keyframe> pending_keyframe_;
   map_id map_ = no_id;  ///< the map of the views and of the pending frame
