@@ -37,7 +37,7 @@ ORBIS_SLAM_SYSTEM::system(Camera camera, const options& settings, Extractor extr
       shared_{make_rig(std::move(camera), settings), options_, std::move(places)},
       front_end_{std::make_unique<front_end>(shared_.rig, options_)},
       localization_only_{settings.localization_only},
-      back_end_{std::make_unique<back_end>(shared_)} {}
+      back_end_{std::make_unique<back_end>(shared_, [this] { return front_end_->improve_frame(shared_.atlas); })} {}
 
 ORBIS_SLAM_SYSTEM_TEMPLATE
 ORBIS_SLAM_SYSTEM::~system() = default;

@@ -151,13 +151,14 @@ class system {
   /// Waits until the threads are idle.
   void wait() const;
   /// Requests that mapping end soon so that a program can exit: running adjustments end early, and neither waiting nor
-  /// later keyframes are mapped or checked for loops. `wait` then returns soon, and all results so far can be read. May
-  /// be called from any thread. Cannot be undone.
+  /// later keyframes are mapped or checked for loops, nor are frames localised again. `wait` then returns soon, and all
+  /// results so far can be read. May be called from any thread. Cannot be undone.
   void stop() noexcept;
 
   /// Returns the poses of the frames that were tracked in the active map: all, or those within
   /// `options::trajectory_frames`. The poses follow later corrections of the keyframes. Unless fewer than 100 frames
-  /// are kept, the first 100 frames of a map are localised again after five more keyframes. O(frames).
+  /// are kept, the first 100 frames of a map are localised again after five more keyframes; with threads, call `wait`
+  /// first. O(frames).
   [[nodiscard]] orbis::trajectory trajectory() const;
   /// As above, for another map; empty if that map does not exist or none of its frames is left.
   [[nodiscard]] orbis::trajectory trajectory(map_id map) const;

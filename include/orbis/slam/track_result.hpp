@@ -39,7 +39,7 @@ enum class track_state {
 struct track_timings {
   double features_ms = 0.0;  ///< feature extraction and depth
   double tracking_ms = 0.0;  ///< estimation of the pose
-  double mapping_ms = 0.0;   ///< keyframe creation, second localisation of early frames; without threads, all mapping
+  double mapping_ms = 0.0;   ///< keyframe creation; without threads, all work of the back end
 };
 
 /// The result of tracking one frame.

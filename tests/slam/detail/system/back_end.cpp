@@ -51,6 +51,27 @@ TEST_CASE("A keyframe is mapped, closes a loop, and the map is adjusted, in thre
   }
 }
 
+TEST_CASE("Frames are improved once a keyframe has been mapped, until there is none or the back end is stopped") {
+  using back_end_type = slam::detail::back_end<camera::any_camera, features::binary_descriptor<256>, bow_places>;
+  for (const bool threads : {false, true})
+    for (const bool stops : {false, true}) {
+      scene s{threads};
+      const std::size_t places = s.shared.places.size();
+      std::size_t calls = 0;
+      bool is_mapped = true;
+      back_end_type back_end{s.shared, [&] {
+                               is_mapped =
+                                   is_mapped && s.shared.places.size() + s.shared.keyframes_culled == places + 1;
+                               if (stops) back_end.stop();
+                               return ++calls <= 3;
+                             }};
+      back_end.process({0, 63});
+      back_end.wait();
+      CHECK(is_mapped);
+      CHECK(calls == (stops ? 1 : 4));
+    }
+}
+
 TEST_CASE("A back end that ends does not wait for what is in its queue") {
   scene s{true};
   {

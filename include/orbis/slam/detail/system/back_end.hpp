@@ -133,13 +133,17 @@ class worker {
 };
 
 /// Processes each new keyframe: local mapping, then loop closing, then, if a loop was closed, global adjustment. With
-/// threads, each of the three has a separate thread and passes the keyframe to the next. All queues are bounded:
-/// mapping waits while too many keyframes are waiting for loop closing, and a map is queued for adjustment at most
-/// once.
+/// threads, each of the three has a separate thread and passes the keyframe to the next. The mapping thread also
+/// localises young frames again. All queues are bounded: mapping waits while too many keyframes are waiting for
+/// loop closing, and a map is queued for adjustment at most once.
 template <camera::camera_model Camera, feature_descriptor D, place_recognizer<D> Places>
 class back_end {
  public:
-  explicit back_end(shared_state<Camera, D, Places>& shared) : shared_{shared}, mapper_{shared}, closer_{shared} {
+  /// `improve_frame`: improves the pose of one frame after a keyframe has been mapped, and returns false if there is
+  /// none; it is called with `shared.lock()` held, for one frame at a time.
+  explicit back_end(
+      shared_state<Camera, D, Places>& shared, std::function<bool()> improve_frame = [] { return false; })
+      : shared_{shared}, mapper_{shared}, closer_{shared}, improve_frame_{std::move(improve_frame)} {
     if (!shared.settings.threads.enabled) return;
     global_ = std::make_unique<worker<map_id>>([this](map_id m) { closer_.adjust_globally(m); });
     loops_ = std::make_unique<worker<map_keyframe>>([this](map_keyframe k) {
@@ -149,7 +153,8 @@ class back_end {
     mapping_ = std::make_unique<worker<map_keyframe>>([this](map_keyframe k) {
       if (stopped_) return;
       // If `track` waits for mapping, the load of the machine must affect only the time, not the map.
-      mapper_.process(k, [this] { return stopped_ || (!shared_.settings.threads.wait && mapping_->waiting() != 0); });
+      map_keyframe_and_frames(
+          k, [this] { return stopped_ || (!shared_.settings.threads.wait && mapping_->waiting() != 0); });
       loops_->wait_for_room(most_waiting());
       loops_->push(k);
     });
@@ -169,7 +174,7 @@ class back_end {
   void process(map_keyframe k) {
     if (mapping_) return mapping_->push(k);
     if (stopped_) return;
-    mapper_.process(k, [this] { return stopped_.load(); });
+    map_keyframe_and_frames(k, [this] { return stopped_.load(); });
     if (!stopped_ && closer_.close(k)) closer_.adjust_globally(shared_.atlas.current(k).map);
   }
   /// Requests that the work end soon: adjustments end early; waiting and later keyframes are not processed. May be
@@ -192,6 +197,12 @@ class back_end {
   }
 
  private:
+  void map_keyframe_and_frames(map_keyframe k, const std::function<bool()>& stop_requested) {
+    mapper_.process(k, stop_requested);
+    if (stopped_ || !shared_.locked(improve_frame_)) return;  // at least one, even if another keyframe waits
+    while (!stop_requested() && shared_.locked(improve_frame_)) {
+    }
+  }
   [[nodiscard]] std::size_t most_waiting() const {
     return shared_.settings.threads.max_waiting == 0 ? 1 : shared_.settings.threads.max_waiting;
   }
@@ -200,6 +211,7 @@ class back_end {
   std::atomic<bool> stopped_{false};
   local_mapper<Camera, D, Places> mapper_;
   loop_closer<Camera, D, Places> closer_;
+  std::function<bool()> improve_frame_;
   std::unique_ptr<worker<map_id>> global_;  ///< null, like the other workers, if there are no threads
   std::unique_ptr<worker<map_keyframe>> loops_, mapping_;
 };

@@ -22,7 +22,7 @@ namespace orbis::slam::detail {
 /// - `edit()`: held while maps are changed in several steps (mapping of a keyframe, correction of a loop, global
 /// adjustment). Between these steps, only tracking changes the map: it adds data, and forgets keyframes erased long
 /// ago;
-/// - `lock()`: held for a short time while any of this state is read or changed; never while solving or during
+/// - `lock()`: held for a few milliseconds while any of this state is read or changed; never during adjustments or
 /// callbacks.
 ///
 /// Both are fair: a thread that releases and relocks a lock repeatedly lets waiting threads go first.

@@ -36,7 +36,7 @@
 namespace orbis::slam::detail {
 
 /// Tracks the frames of one camera. It takes no lock: the caller must ensure that the maps are not changed during a
-/// call.
+/// call, and that `improve_frame`, which the mapping thread calls, does not run at the same time as another function.
 ///
 /// Follows R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), section III.
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
@@ -62,7 +62,7 @@ class front_end {
 
   front_end(const camera_rig<Camera>& rig, const options& settings)
       : context_{rig, settings},
-        young_{rig, settings, context_.search, context_.patches},
+        young_{rig, settings, context_.search},
         shutter_{settings.shutter},
         log_{settings.trajectory_frames} {}
 
@@ -144,6 +144,10 @@ class front_end {
     if (!t.is_frozen) forget_erased(t.maps);
     return result;
   }
+
+  /// Localises again the oldest waiting frame of a young map. Returns false if no frame is due. Takes a few
+  /// milliseconds.
+  bool improve_frame(const atlas_type& maps) { return young_.localize_oldest(log_, context_.patches, maps); }
 
   /// If the trajectory is limited, makes the active map forget erased keyframes except the latest ones and the
   /// reference keyframes of the frames in the trajectory. O(1), except O(frames + n log n) for every thousandth erased
@@ -263,9 +267,8 @@ class front_end {
     if (start_.begins_map()) young_.begin_map(maps.active_id());
     if (made) young_.count_keyframe(made->map);
     const bool may_wait = !made && state == track_state::tracking && !f.held_by_depth;
-    if (may_wait && context_.moving.size() == 0) young_.add(f, context_.depth_quadratic, log_);
+    if (may_wait && context_.moving.size() == 0) young_.add(f, context_.patches, context_.depth_quadratic, log_);
     context_.set_last(std::move(f), anchor);
-    if (!made) young_.localize_oldest(log_, maps);
   }
   /// Passes a tracked frame to the shutter observer.
   void observe(const task& t, const std::optional<map_keyframe>& made) {

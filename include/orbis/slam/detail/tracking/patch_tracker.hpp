@@ -60,6 +60,11 @@ class patch_tracker {
   /// Returns a copy of the image. @pre is_ready()
   [[nodiscard]] image<std::uint8_t> copy_image() const { return image<std::uint8_t>{(*image_.levels)[0]}; }
 
+  /// Takes over the estimated errors of another tracker: the exposure time, and the deviation of patch positions.
+  void set_errors(const patch_tracker& other) {
+    estimation_ = other.estimation_;
+    deviation_ = other.deviation_;
+  }
   /// The exposure time, given or estimated, seconds.
   [[nodiscard]] double exposure() const noexcept { return options_.exposure.value_or(estimation_.exposure()); }
 

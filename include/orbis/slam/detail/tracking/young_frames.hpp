@@ -8,9 +8,7 @@
 #include <cstdint>
 #include <deque>
 #include <optional>
-#include <span>
 #include <utility>
-#include <vector>
 
 #include <orbis/camera/model.hpp>
 #include <orbis/core/image.hpp>
@@ -37,9 +35,12 @@ namespace orbis::slam::detail {
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
 class young_frames {
  public:
-  young_frames(const camera_rig<Camera>& rig, const options& settings, const tracker<Camera, D, Matchers>& track,
-               patch_tracker<Camera, D>& patches)
-      : rig_{rig}, options_{settings}, tracker_{track}, patches_{patches}, nothing_moves_{rig, settings} {}
+  young_frames(const camera_rig<Camera>& rig, const options& settings, const tracker<Camera, D, Matchers>& track)
+      : rig_{rig},
+        options_{settings},
+        tracker_{track},
+        patches_{rig, settings.patches},
+        nothing_moves_{rig, settings} {}
 
   young_frames(const young_frames&) = delete;  // it refers to members of its owner
   young_frames& operator=(const young_frames&) = delete;
@@ -56,25 +57,30 @@ class young_frames {
   void count_keyframe(map_id map) { keyframes_ += map == map_; }
 
   /// Adds the last frame of the log, with its image, if it is one of the first frames of the map and not too many are
-  /// waiting. `depth`: the depth term of its pose, if any.
-  void add(const basic_frame<D>& f, const std::optional<pose_quadratic>& depth, const frame_log& log) {
+  /// waiting. `of_tracking`: the patch tracker that has the image of the frame, if there is one; `depth`: the depth
+  /// term of its pose, if any.
+  void add(const basic_frame<D>& f, const patch_tracker<Camera, D>& of_tracking,
+           const std::optional<pose_quadratic>& depth, const frame_log& log) {
     const std::size_t number = log.end_number() - 1;
-    if (count_ == most || !patches_.is_ready() || log.reference(number).map != map_) return;
+    if (count_ == most || !of_tracking.is_ready() || log.reference(number).map != map_) return;
     ++count_;
     const auto width = static_cast<std::size_t>(rig_.camera().width());
     if ((waiting_.size() + 1) * width * static_cast<std::size_t>(rig_.camera().height()) > most_pixels) return;
     const auto landmarks = std::count_if(f.landmarks.begin(), f.landmarks.end(), [](auto l) { return l != no_id; });
-    waiting_.push_back({f, patches_.copy_image(), depth, number, keyframes_, static_cast<std::size_t>(landmarks)});
+    waiting_.push_back({f, of_tracking.copy_image(), depth, number, keyframes_, static_cast<std::size_t>(landmarks)});
   }
 
   /// If enough keyframes have followed the oldest frame, localises it again in the current map, corrects its pose in
-  /// the log, and forgets the frame. Takes a few milliseconds.
-  void localize_oldest(frame_log& log, const basic_atlas<D>& maps) {
-    if (waiting_.empty()) return;
+  /// the log, and forgets the frame; otherwise returns false. Takes a few milliseconds. `of_tracking`: the patch
+  /// tracker from which the estimated errors are taken.
+  bool localize_oldest(frame_log& log, const patch_tracker<Camera, D>& of_tracking, const basic_atlas<D>& maps) {
+    if (waiting_.empty()) return false;
     young_frame& oldest = waiting_.front();
-    if (oldest.keyframes + enough > keyframes_) return;
+    if (oldest.keyframes + enough > keyframes_) return false;
+    patches_.set_errors(of_tracking);
     if (const auto pose = localize(oldest, log, maps)) log.set_pose(oldest.number, *pose, maps);
     waiting_.pop_front();
+    return true;
   }
 
  private:
@@ -131,7 +137,7 @@ class young_frames {
   const camera_rig<Camera>& rig_;
   const options& options_;
   const tracker<Camera, D, Matchers>& tracker_;
-  patch_tracker<Camera, D>& patches_;
+  patch_tracker<Camera, D> patches_;
   moving_features<Camera, D, Matchers> nothing_moves_;
   std::deque<young_frame> waiting_;
   map_id map_ = no_id;        ///< the last map that was started
