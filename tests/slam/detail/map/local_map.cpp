@@ -50,9 +50,32 @@ TEST_CASE("The local map is the reference, who shares with the frame, and their 
   const auto landmarks = slam::detail::observed_landmarks(m, {3, 4, 5, 3});
   CHECK(landmarks.size() == 80);
   CHECK(std::is_sorted(landmarks.begin(), landmarks.end()));
+  CHECK(std::adjacent_find(landmarks.begin(), landmarks.end()) == landmarks.end());
+  for (const slam::keyframe_id k : {3, 4, 5})
+    for (const slam::landmark_id l : m.at(k).landmarks)
+      CHECK(std::binary_search(landmarks.begin(), landmarks.end(), l));
+  CHECK(slam::detail::observed_landmarks(m, {}).empty());
 
   m.erase_keyframe(20);  // its heir takes its place
   CHECK(slam::detail::local_keyframes(m, query, 20, 3) == std::vector<slam::keyframe_id>{19, 9, 10});
+}
+
+TEST_CASE("Ids are sorted, and each is kept once, whether they are dense or far apart") {
+  random_bits random(7);
+  for (const std::uint32_t range : {1U, 100U, 4000U, 4'000'000'000U}) {
+    std::vector<slam::landmark_id> ids;
+    for (int i = 0; i != 500; ++i) ids.emplace_back(static_cast<std::uint32_t>(random.uniform(0.0, range)));
+    auto expected = ids;
+    std::sort(expected.begin(), expected.end());
+    expected.erase(std::unique(expected.begin(), expected.end()), expected.end());
+    slam::detail::sort_unique(ids);
+    CHECK(ids == expected);
+    slam::detail::sort_unique(ids);
+    CHECK(ids == expected);
+  }
+  std::vector<slam::landmark_id> none;
+  slam::detail::sort_unique(none);
+  CHECK(none.empty());
 }
 
 TEST_CASE("A frame that shows nothing has the surroundings of its reference") {

@@ -36,6 +36,12 @@ struct search_list {
     keypoints.push_back(k);
     windows.push_back(w);
   }
+  void reserve(std::size_t n) {
+    points.reserve(n);
+    descriptors.reserve(n);
+    keypoints.reserve(n);
+    windows.reserve(n);
+  }
   [[nodiscard]] std::size_t size() const noexcept { return points.size(); }
 };
 

@@ -4,7 +4,9 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include <orbis/slam/detail/map/counter.hpp>
@@ -62,16 +64,34 @@ template <feature_descriptor D>
   return around;
 }
 
+/// Sorts ids in ascending order and removes repeated ones. O(n) if the ids are dense; otherwise O(n log n).
+inline void sort_unique(std::vector<landmark_id>& ids) {
+  if (ids.empty()) return;
+  const auto [low, high] = std::minmax_element(ids.begin(), ids.end());
+  const landmark_id first = *low;
+  const std::size_t words = (*high - first) / 64 + 1;
+  if (words > ids.size()) {
+    std::sort(ids.begin(), ids.end());
+    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+    return;
+  }
+  std::vector<std::uint64_t> seen(words);  // one bit for each id
+  for (const landmark_id id : ids) seen[(id - first) / 64] |= std::uint64_t{1} << ((id - first) % 64);
+  ids.clear();
+  for (std::uint32_t w = 0; w != words; ++w)
+    for (std::uint64_t bits = seen[w]; bits != 0; bits &= bits - 1)
+      ids.push_back(first + 64 * w + static_cast<std::uint32_t>(std::countr_zero(bits)));
+}
+
 /// Returns the landmarks that these keyframes observe, each once, in ascending order.
 template <feature_descriptor D>
 [[nodiscard]] std::vector<landmark_id> observed_landmarks(const basic_map<D>& m,
                                                           const std::vector<keyframe_id>& keyframes) {
-  counter<landmark_id> seen;
   std::vector<landmark_id> all;
   for (const keyframe_id k : keyframes)
     for (const landmark_id l : m.at(k).landmarks)
-      if (l != no_id && seen.add(l)) all.push_back(l);
-  std::sort(all.begin(), all.end());
+      if (l != no_id) all.push_back(l);
+  sort_unique(all);
   return all;
 }
 

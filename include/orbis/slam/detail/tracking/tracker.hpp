@@ -192,8 +192,10 @@ class tracker {
                            Found&& found) const {
     const features::camera_projection project{rig_.camera(), f.T_world_camera};
     const features::projection_rule rule = make_rule(rig_.scales, radius);
+    const std::vector<landmark_id> around = local_landmarks(m, f, reference, options_.local_keyframes);
     search_list<D> list;
-    for (const landmark_id id : local_landmarks(m, f, reference, options_.local_keyframes))
+    list.reserve(around.size());
+    for (const landmark_id id : around)
       if (!moving.is_excluded(m, id, f.timestamp) && add_landmark(list, project, rule, m.landmark_at(id), id))
         expected(id);
     std::vector<features::match> matches = Matchers::landmarks(list.descriptors, f.features, list.windows, f.grid);
@@ -211,6 +213,7 @@ class tracker {
                                            double radius) const {
     const features::camera_projection project{rig_.camera(), T_world_camera};
     search_list<D> list;
+    list.reserve(last.size());
     for (std::size_t i = 0; i < last.size(); ++i) {
       candidate_point p;
       p.landmark = m.replacement(last.landmarks[i]);
