@@ -107,7 +107,7 @@ TEST_CASE("A patch without texture, outside of the image, or elsewhere is not fo
   const auto patch = patch_of(zeros<vec2>());
   const auto image = picture(zeros<vec2>());
   const auto none = zeros<vec2>();
-  CHECK_FALSE(match_patch(patch, none, none, image, at(5.0, 32.0)));
+  CHECK_FALSE(match_patch(patch, none, none, image, at(4.0, 32.0)));
   CHECK_FALSE(match_patch(patch, none, none, image, at(32.0, 60.0)));
   CHECK_FALSE(match_patch(patch, none, none, image, at(1e9, -1e9)));
   CHECK_FALSE(match_patch(patch, none, none, image, at(std::nan(""), 32.0)));
@@ -118,6 +118,21 @@ TEST_CASE("A patch without texture, outside of the image, or elsewhere is not fo
   CHECK_FALSE(match_patch(flat, none, none, image, at(32.0, 32.0)));
   const auto elsewhere = match_patch(patch, none, none, image, at(20.0, 45.0));
   CHECK((!elsewhere || elsewhere->correlation < 0.9));
+}
+
+TEST_CASE("At the border, a patch is found if the image contains what the shift needs") {
+  const auto patch = patch_of(zeros<vec2>());
+  const auto image = picture(zeros<vec2>());
+  const auto find = [&](int middle,
+                        double off) {  // in an image where the middle of the patch is `middle` pixels from the border
+    const image_view<const std::uint8_t> cut(&image(32 - middle, 0), 32 + middle, 64, 64);
+    return match_patch(patch, zeros<vec2>(), zeros<vec2>(), cut, at(middle - off, 32.0));
+  };
+  const auto near = find(5, -0.4);  // the region for shifts of up to three pixels is outside
+  REQUIRE(near);
+  CHECK(norm(near->shift - vec2(-0.4, 0.0)) < 0.03);
+  CHECK_FALSE(find(7, 2.0));  // as here, where it is needed
+  CHECK(find(9, 2.0));
 }
 
 TEST_CASE("A line kernel has the mean of its line, and its weights add up to one") {
@@ -131,11 +146,13 @@ TEST_CASE("A line kernel has the mean of its line, and its weights add up to one
     for (int y = 0; y != 30; ++y)
       for (int x = 0; x != stride; ++x)
         ramp[static_cast<std::size_t>(y * stride + x)] = static_cast<float>(2 * x + 3 * y);
-    kernel.apply<10, simd::portable>(&ramp[10 * stride + 10], stride, mean.data());
-    for (int y = 0; y != 10; ++y)
-      for (int x = 0; x != 16; ++x)
-        CHECK(std::abs(mean[static_cast<std::size_t>(16 * y + x)] - static_cast<float>(2 * (x + 10) + 3 * (y + 10))) <
-              0.01F);
+    for (const int columns : {8, 10, 16}) {
+      kernel.apply<simd::portable>(10, columns, &ramp[10 * stride + 10], stride, mean.data());
+      for (int y = 0; y != 10; ++y)
+        for (int x = 0; x != columns; ++x)
+          CHECK(std::abs(mean[static_cast<std::size_t>(16 * y + x)] - static_cast<float>(2 * (x + 10) + 3 * (y + 10))) <
+                0.01F);
+    }
   }
 }
 

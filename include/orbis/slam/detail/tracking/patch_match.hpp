@@ -46,43 +46,47 @@ class line_kernel {
     }
     if (extent > longest) line = (longest / extent) * line;
     const int steps = 2 * static_cast<int>(std::ceil(norm(line))) + 1;
-    std::array<float, std::size_t{side} * side> dense{};
+    const double share = 1.0 / steps, end = 0.5 - 0.5 * share;
+    reach_x_ = static_cast<int>(std::ceil(end * std::abs(line.x())));
+    reach_y_ = static_cast<int>(std::ceil(end * std::abs(line.y())));
+    const int columns = 2 * reach_x_ + 2, rows = 2 * reach_y_ + 2;  // one more for the neighbour of the last pixel
+    std::array<float, std::size_t{side + 1} * (side + 1)> dense;
+    std::fill_n(dense.begin(), columns * rows, 0.0F);
     for (int k = 0; k != steps; ++k) {
-      const double t = (k + 0.5) / steps - 0.5, x = reach + t * line.x(), y = reach + t * line.y();
-      const int left = std::min(static_cast<int>(x), side - 2), top = std::min(static_cast<int>(y), side - 2);
-      const double fx = x - left, fy = y - top;
-      const auto cell = static_cast<std::size_t>(top * side + left);
-      dense[cell] += static_cast<float>((1.0 - fx) * (1.0 - fy) / steps);
-      dense[cell + 1] += static_cast<float>(fx * (1.0 - fy) / steps);
-      dense[cell + side] += static_cast<float>((1.0 - fx) * fy / steps);
-      dense[cell + side + 1] += static_cast<float>(fx * fy / steps);
+      const double t = (k + 0.5) * share - 0.5, x = reach_x_ + t * line.x(), y = reach_y_ + t * line.y();
+      const int left = static_cast<int>(x), top = static_cast<int>(y);
+      const double fx = x - left, fy = share * (y - top);
+      const auto cell = static_cast<std::size_t>(top * columns + left),
+                 below = cell + static_cast<std::size_t>(columns);
+      dense[cell] += static_cast<float>((1.0 - fx) * (share - fy));
+      dense[cell + 1] += static_cast<float>(fx * (share - fy));
+      dense[below] += static_cast<float>((1.0 - fx) * fy);
+      dense[below + 1] += static_cast<float>(fx * fy);
     }
-    for (int y = 0; y != side; ++y)
-      for (int x = 0; x != side; ++x)
-        if (const float w = dense[static_cast<std::size_t>(y * side + x)]; w > 0.0F) {
-          weights_[count_++] = {x - reach, y - reach, w};
-          reach_x_ = std::max(reach_x_, std::abs(x - reach));
-          reach_y_ = std::max(reach_y_, std::abs(y - reach));
-        }
+    for (int y = 0; y + 1 != rows; ++y)
+      for (int x = 0; x + 1 != columns; ++x)
+        if (const float w = dense[static_cast<std::size_t>(y * columns + x)]; w > 0.0F)
+          weights_[count_++] = {x - reach_x_, y - reach_y_, w};
   }
 
-  /// The horizontal and vertical distances of the farthest pixels with a nonzero weight.
+  /// The horizontal and vertical distances of the farthest pixels.
   [[nodiscard]] int reach_x() const noexcept { return reach_x_; }
   [[nodiscard]] int reach_y() const noexcept { return reach_y_; }
 
-  /// Sets `to`, `Rows` rows of 16 values, to the weighted means around the values starting at `from`, whose rows are
-  /// `stride` apart.
-  template <int Rows, simd::target Target>
-  ORBIS_ALWAYS_INLINE void apply(const float* from, std::ptrdiff_t stride, float* to) const {
+  /// Sets `rows` rows of `columns` values at `to`, 16 values apart, to the weighted means around the values starting at
+  /// `from`, whose rows are `stride` apart. @pre 8 <= columns <= 16
+  template <simd::target Target>
+  ORBIS_ALWAYS_INLINE void apply(int rows, int columns, const float* from, std::ptrdiff_t stride, float* to) const {
     using lanes = simd::vec<float, 8, Target>;
-    for (int y = 0; y != Rows; ++y, from += stride, to += 16) {
+    const int second = columns - 8;  // the two vectors may overlap
+    for (int y = 0; y != rows; ++y, from += stride, to += 16) {
       lanes left(0.0F), right(0.0F);
       for (std::size_t k = 0; k != count_; ++k) {
         const float* const row = from + weights_[k].y * stride + weights_[k].x;
         left += lanes(weights_[k].weight) * lanes::load(row);
-        right += lanes(weights_[k].weight) * lanes::load(row + 8);
+        right += lanes(weights_[k].weight) * lanes::load(row + second);
       }
-      left.store(to), right.store(to + 8);
+      left.store(to), right.store(to + second);
     }
   }
 
@@ -119,19 +123,18 @@ struct match_patch_kernel {
                                       const line_kernel& by_patch, image_view<const std::uint8_t> image,
                                       const patch_placement& expected, patch_shift& found) {
     using lanes = simd::vec<float, 8, Target>;
-    constexpr int side = 8;           // size of the compared region: a row is one vector
-    constexpr int around = 3;         // maximum shift, pixels
     constexpr double weakest = 64.0;  // smallest eigenvalue of the sum of squared gradients, grey levels squared
     constexpr int most_iterations = 12;
     constexpr double enough = 0.01;  // pixels
 
     // The blurred centre of the patch, with a border for the gradient.
     constexpr int size = landmark_patch::size, first = (size - side) / 2 - 1;
-    std::array<float, std::size_t{size} * size + 16> values;
-    for (std::size_t k = 0; k != pixels.size(); ++k) values[k] = static_cast<float>(pixels[k]);
-    for (std::size_t k = pixels.size(); k != values.size(); ++k) values[k] = 0.0F;
+    std::array<float, std::size_t{size} * size> values;
+    const int rows = side + 2 + 2 * by_image.reach_y(), begin = size * (size - rows) / 2;
+    for (int k = begin; k != begin + size * rows; ++k)
+      values[static_cast<std::size_t>(k)] = static_cast<float>(pixels[static_cast<std::size_t>(k)]);
     float blurred[10][16];
-    by_image.apply<10, Target>(values.data() + first * size + first, size, blurred[0]);
+    by_image.apply<Target>(10, 10, values.data() + first * size + first, size, blurred[0]);
     lanes t[side], gx[side], gy[side], sum_t(0.0F), sum_x(0.0F), sum_y(0.0F);
     for (int y = 0; y != side; ++y) {
       t[y] = lanes::load(&blurred[y + 1][1]);
@@ -152,17 +155,15 @@ struct match_patch_kernel {
     const double determinant = xx * yy - xy * xy, trace = xx + yy;
     if (!(0.5 * (trace - std::sqrt(std::max(0.0, trace * trace - 4.0 * determinant))) >= weakest)) return false;
 
-    // The image around the expected position, sampled at pixels of the patch.
-    constexpr int window = side + 2 * (around + 1), margin = line_kernel::reach, stride = window + 2 * margin + 4;
-    static_assert(window == 16 && stride % 8 == 0);
-    std::array<float, std::size_t{stride} * (window + 2 * margin) + 8> seen;  // a vector may extend beyond its row
-    if (!sample<Target>(image, expected, by_patch, seen.data(), stride)) return false;
-    float there[window][16];
-    by_patch.apply<window, Target>(seen.data() + margin * stride + margin, stride, there[0]);
+    // The image at the pixels of the patch, with the expected position in the middle. Most shifts are below one pixel:
+    // a wider region is sampled only if a step leaves it.
+    float there[window][window];
+    int around = 1;
+    if (!sample<Target>(image, expected, by_patch, around, there)) return false;
 
     found = {zeros<vec2>(), 0.0};
     for (int k = 0; k != most_iterations; ++k) {
-      const double px = found.shift.x() + around + 1, py = found.shift.y() + around + 1;
+      const double px = found.shift.x() + farthest + 1, py = found.shift.y() + farthest + 1;
       const int left = static_cast<int>(px), top = static_cast<int>(py);
       const lanes fx(static_cast<float>(px - left)), fy(static_cast<float>(py - top));
       lanes values_here[side], sum(0.0F);
@@ -188,31 +189,43 @@ struct match_patch_kernel {
       const double bx = contrast * lane_sum(sum_ix) - tx, by = contrast * lane_sum(sum_iy) - ty;
       const vec2 step((yy * bx - xy * by) / determinant, (xx * by - xy * bx) / determinant);
       found.shift = {found.shift.x() - step.x(), found.shift.y() - step.y()};
-      if (!(std::abs(found.shift.x()) < around && std::abs(found.shift.y()) < around)) return false;
+      const double shift = std::max(std::abs(found.shift.x()), std::abs(found.shift.y()));
+      if (!(shift < farthest)) return false;
       if (step.x() * step.x() + step.y() * step.y() < enough * enough) return true;
+      if (shift < around) continue;
+      around = farthest;
+      if (!sample<Target>(image, expected, by_patch, around, there)) return false;
     }
     return false;
   }
 
  private:
+  static constexpr int side = 8;      ///< size of the compared region: a row is one vector
+  static constexpr int farthest = 3;  ///< maximum shift, pixels
+  static constexpr int window = side + 2 * (farthest + 1);
+  static_assert(window == 16);  // as `line_kernel::apply` expects
+
   template <class L>
   static ORBIS_ALWAYS_INLINE double lane_sum(const L& v) {
     return static_cast<double>(simd::sum(v));
   }
-  /// Samples the image at the patch pixels that `by_patch` needs. `to`: the samples, starting at patch coordinate
-  /// -(8 + margin), in rows `stride` apart. Returns false if one of these pixels is outside the image.
+  /// Samples the image at the pixels of the patch for shifts of up to `around` pixels, and blurs the samples by
+  /// `by_patch`. `to`: the pixels around the centre, of which those that are needed are set. Returns false if a sample
+  /// is outside the image.
   template <simd::target Target>
   static ORBIS_ALWAYS_INLINE bool sample(image_view<const std::uint8_t> image, const patch_placement& expected,
-                                         const line_kernel& by_patch, float* to, int stride) {
+                                         const line_kernel& by_patch, int around, float (*to)[window]) {
     using lanes = simd::vec<float, 8, Target>;
     using integers = simd::vec<std::int32_t, 8, Target>;
-    constexpr int window = 16, margin = line_kernel::reach, side = window + 2 * margin;
+    constexpr int margin = line_kernel::reach, stride = window + 2 * margin;
+    const int first = farthest + 1 - around, count = side + 2 * around;  // rows and columns of `to`
     const auto place = [&](int x, int y) {
-      const double u = x - 0.5 * (side - 1), v = y - 0.5 * (side - 1);
+      const double u = x - 0.5 * (stride - 1), v = y - 0.5 * (stride - 1);
       return vec2(expected.centre.x() + u * expected.across.x() + v * expected.down.x(),
                   expected.centre.y() + u * expected.across.y() + v * expected.down.y());
     };
-    const int x0 = margin - by_patch.reach_x(), x1 = side - x0, y0 = margin - by_patch.reach_y(), y1 = side - y0;
+    const int x0 = margin + first - by_patch.reach_x(), x1 = margin + first + count + by_patch.reach_x();
+    const int y0 = margin + first - by_patch.reach_y(), y1 = margin + first + count + by_patch.reach_y();
     for (const int x : {x0, x1 - 1})
       for (const int y : {y0, y1 - 1}) {
         const vec2 corner = place(x, y);
@@ -220,24 +233,25 @@ struct match_patch_kernel {
               corner.y() < image.height() - 1.01))
           return false;
       }
-    // Lanes beyond x1 are clamped to the image and not used.
-    const lanes right(static_cast<float>(image.width()) - 1.01F), bottom(static_cast<float>(image.height()) - 1.01F);
     alignas(32) constexpr std::array<float, 8> ramp{0, 1, 2, 3, 4, 5, 6, 7};
     const lanes along = lanes::load(ramp.data());
     const lanes step_x = along * lanes(static_cast<float>(expected.across.x()));
     const lanes step_y = along * lanes(static_cast<float>(expected.across.y()));
+    const integers image_stride(static_cast<std::int32_t>(image.stride()));
+    std::array<float, std::size_t{stride} * stride> samples;
     for (int y = y0; y != y1; ++y)
-      for (int x = x0; x < x1; x += 8) {
+      for (int next = x0; next < x1; next += 8) {
+        const int x = std::min(next, x1 - 8);
         const vec2 begin = place(x, y);
-        const lanes u = max(lanes(0.0F), min(right, lanes(static_cast<float>(begin.x())) + step_x));
-        const lanes v = max(lanes(0.0F), min(bottom, lanes(static_cast<float>(begin.y())) + step_y));
+        const lanes u = lanes(static_cast<float>(begin.x())) + step_x,
+                    v = lanes(static_cast<float>(begin.y())) + step_y;
         const integers left = simd::convert<std::int32_t>(u), top = simd::convert<std::int32_t>(v);
         // Reading two neighbouring pixels of a row at once halves the number of loads, which take half of the time.
-        std::array<std::int32_t, 8> columns, rows;
+        std::array<std::int32_t, 8> offsets;
         std::array<std::uint16_t, 8> upper_pairs, lower_pairs;
-        left.store(columns.data()), top.store(rows.data());
+        (top * image_stride + left).store(offsets.data());
         for (std::size_t k = 0; k != 8; ++k) {
-          const std::uint8_t* const at = &image(columns[k], rows[k]);
+          const std::uint8_t* const at = image.data() + offsets[k];
           std::memcpy(&upper_pairs[k], at, 2);
           std::memcpy(&lower_pairs[k], at + image.stride(), 2);
         }
@@ -250,8 +264,10 @@ struct match_patch_kernel {
           return first + fx * (second - first);
         };
         const lanes upper = between(upper_pairs), lower = between(lower_pairs);
-        (upper + fy * (lower - upper)).store(to + y * stride + x);
+        (upper + fy * (lower - upper)).store(&samples[static_cast<std::size_t>(y * stride + x)]);
       }
+    by_patch.apply<Target>(count, count, &samples[static_cast<std::size_t>((margin + first) * (stride + 1))], stride,
+                           &to[first][first]);
     return true;
   }
 };
@@ -260,7 +276,8 @@ struct match_patch_kernel {
 /// blurred by motion: the patch by `patch_smear`, the image by `image_smear` (in pixels of the patch). Each is
 /// additionally blurred by the motion of the other, which makes both equal: blur along two lines does not depend on
 /// their order. Patch and image may differ in mean and contrast. Empty if the patch lacks texture in some direction,
-/// leaves the image, or is not found.
+/// leaves the image, or is not found. The image must contain the pixels that the search needs: those for shifts of up
+/// to one pixel and, if a step goes beyond, of up to three.
 ///
 /// Sources: S. Baker, I. Matthews, "Lucas-Kanade 20 years on", IJCV 56 (2004), for the inverse compositional steps;
 /// H. Jin, P. Favaro, R. Cipolla, "Visual tracking in the presence of motion blur", CVPR 2005, for blurring the patch.

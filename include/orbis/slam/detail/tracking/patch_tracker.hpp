@@ -86,6 +86,7 @@ class patch_tracker {
       f.spreads[i] = make_spread(1.0, corner_smear(seconds / scale * motion));
       if (f.landmarks[i] == no_id) continue;
       const basic_landmark<D>& l = m.landmark_at(f.landmarks[i]);
+      if (l.patch.pixels) __builtin_prefetch(l.patch.pixels->data());  // read after the prediction
       const auto view = predict_view(f, i, l, T_camera_world, motion);
       if (!view) continue;
       const std::size_t every = estimation_.has_enough() ? 32 : 4;  // compares one patch in this number, to save time
