@@ -36,7 +36,8 @@
 namespace orbis::slam::detail {
 
 /// Tracks the frames of one camera. It takes no lock: the caller must ensure that the maps are not changed during a
-/// call, and that `improve_frame`, which the mapping thread calls, does not run at the same time as another function.
+/// call, and that `improve_frame`, which the mapping thread calls, runs neither during `track` nor while the log is
+/// read.
 ///
 /// Follows R. Mur-Artal, J. D. Tardos, "ORB-SLAM2", T-RO 33 (2017), section III.
 template <camera::camera_model Camera, feature_descriptor D, tracking_matchers<D> Matchers>
