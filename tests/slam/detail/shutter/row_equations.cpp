@@ -25,13 +25,8 @@ const camera::pinhole undistorted{640, 480, 525.0, 525.0, 319.5, 239.5};
 const camera::radial_tangential distorted{{640, 480, 517.3, 516.5, 318.6, 255.3},
                                           {.k1 = 0.2624, .k2 = -0.9531, .p1 = -0.0054, .p2 = 0.0026, .k3 = 1.1633}};
 
-vec6 vector6(double a, double b, double c, double d, double e, double f) {
-  vec6 v;
-  v << a, b, c, d, e, f;
-  return v;
-}
-const vec6 motion = vector6(0.3, -0.4, 0.2, 0.7, -0.9, 0.5);
-const se3 pose = se3::exp(vector6(0.5, -0.2, 0.1, 0.3, -0.4, 0.2));
+const vec6 motion = stacked(vec3(0.3, -0.4, 0.2), vec3(0.7, -0.9, 0.5));
+const se3 pose = se3::exp(stacked(vec3(0.5, -0.2, 0.1), vec3(0.3, -0.4, 0.2)));
 
 /// Observations of all kinds: with and without depth and smear, good and bad ones, and points behind the camera.
 std::vector<row_observation> observations_of(std::size_t n) {

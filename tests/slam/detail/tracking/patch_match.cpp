@@ -123,15 +123,15 @@ TEST_CASE("A patch without texture, outside of the image, or elsewhere is not fo
 TEST_CASE("At the border, a patch is found if the image contains what the shift needs") {
   const auto patch = patch_of(zeros<vec2>());
   const auto image = picture(zeros<vec2>());
-  const auto find = [&](int middle,
-                        double off) {  // in an image where the middle of the patch is `middle` pixels from the border
+  // Searches `off` pixels beside the middle of the patch, which is `middle` pixels from the border of the image.
+  const auto find = [&](int middle, double off) {
     const image_view<const std::uint8_t> cut(&image(32 - middle, 0), 32 + middle, 64, 64);
     return match_patch(patch, zeros<vec2>(), zeros<vec2>(), cut, at(middle - off, 32.0));
   };
-  const auto near = find(5, -0.4);  // the region for shifts of up to three pixels is outside
+  const auto near = find(5, -0.4);  // a small shift needs a small region
   REQUIRE(near);
   CHECK(norm(near->shift - vec2(-0.4, 0.0)) < 0.03);
-  CHECK_FALSE(find(7, 2.0));  // as here, where it is needed
+  CHECK_FALSE(find(7, 2.0));  // the region for this shift is outside
   CHECK(find(9, 2.0));
 }
 
